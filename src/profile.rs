@@ -1,0 +1,1 @@
+//! Profiles: every tunable in one TOML file. (STUB, owned by render.)
