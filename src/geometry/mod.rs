@@ -3,8 +3,10 @@
 //! Coordinates are right-handed `f32`; the library attaches no unit to a length.
 
 mod aabb;
+pub mod clip;
 mod hit;
 mod ray;
+pub mod triangle;
 
 pub use aabb::Aabb;
 pub use hit::{Hit, NO_PRIMITIVE};

@@ -1,26 +1,133 @@
-//! The SAH kd-tree.
+//! The SAH kd-tree over a mesh's triangles.
+//!
+//! Everything above this room sees a tree through [`Tree`] alone: a root, nodes that are inner or
+//! leaves, and the triangles of a leaf. How nodes lie in memory is this room's own business.
 
-use serde::{Deserialize, Serialize};
+mod build;
+mod node;
+mod params;
+mod sah;
+mod stats;
+mod validate;
 
-/// What the builder is free to choose.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BuildParams {
-    /// Cost of a step through an inner node.
-    pub traversal_cost: f32,
-    /// Cost of testing one triangle.
-    pub intersection_cost: f32,
+pub use build::BuildProgress;
+pub use node::Node;
+pub use params::{BuildParams, MAX_DEPTH};
+pub use stats::TreeStats;
+
+use crate::error::{Error, Result};
+use crate::geometry::Aabb;
+use crate::geometry::triangle::Corners;
+use crate::mesh::Mesh;
+
+/// What a traversal kernel asks of a tree.
+pub trait Tree {
+    /// The box around all triangles.
+    fn bounds(&self) -> &Aabb;
+    /// Where every walk begins.
+    fn root(&self) -> Node;
+    /// The children of an inner node: below its plane, and above.
+    fn children(&self, inner: Node) -> [Node; 2];
+    /// The primitive ids of a leaf's triangles, in no order that means anything.
+    fn primitives(&self, leaf: Node) -> &[u32];
+    /// A triangle's corners.
+    fn corners(&self, primitive: u32) -> &Corners;
 }
 
-impl Default for BuildParams {
-    fn default() -> Self {
-        Self { traversal_cost: 1.0, intersection_cost: 1.0 }
+/// A kd-tree in memory: nodes, the leaves' references, and the triangles' corners.
+#[derive(Debug)]
+pub struct KdTree {
+    /// The root, an unused place, and then pairs of siblings.
+    nodes: Vec<Node>,
+    /// Primitive ids, leaf after leaf.
+    references: Vec<u32>,
+    /// Corners by primitive id.
+    triangles: Vec<Corners>,
+    bounds: Aabb,
+    params: BuildParams,
+}
+
+impl KdTree {
+    /// Builds the tree of a mesh; `progress`, if given, can be read meanwhile.
+    ///
+    /// The tree is the same for any number of threads.
+    ///
+    /// # Errors
+    /// The mesh has no triangles or too many, an index is out of range, a vertex that a triangle
+    /// uses is not finite, or a parameter makes no sense.
+    pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
+        params.check()?;
+        let triangles = gather(mesh)?;
+        let bounds = Aabb::of_points(triangles.iter().flatten().map(|&corner| corner.into()));
+        let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        Ok(Self { nodes, references, triangles, bounds, params: params.clone() })
+    }
+
+    /// The settings that it was built with.
+    pub fn params(&self) -> &BuildParams {
+        &self.params
     }
 }
 
-/// Figures about a tree.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct TreeStats {
-    /// Triangles that the tree holds.
-    pub triangles: u64,
+/// Every triangle's corners, checked.
+fn gather(mesh: &Mesh) -> Result<Vec<Corners>> {
+    if mesh.triangles.is_empty() {
+        return Err(Error::Mesh("it has no triangles".into()));
+    }
+    if mesh.triangles.len() > node::MAX_INDEX {
+        return Err(Error::Mesh(format!(
+            "{} triangles are more than one tree can hold",
+            mesh.triangles.len()
+        )));
+    }
+    (0..)
+        .zip(&mesh.triangles)
+        .map(|(primitive, indices): (u32, _)| {
+            let mut corners: Corners = [[0.0; 3]; 3];
+            for (corner, &index) in corners.iter_mut().zip(indices) {
+                let Some(position) = mesh.positions.get(index as usize) else {
+                    let count = mesh.positions.len();
+                    return Err(Error::Mesh(format!(
+                        "triangle {primitive} names vertex {index}, but there are only {count} vertices"
+                    )));
+                };
+                if !position.is_finite() {
+                    return Err(Error::Mesh(format!("vertex {index} of triangle {primitive} is not finite")));
+                }
+                *corner = position.to_array();
+            }
+            Ok(corners)
+        })
+        .collect()
 }
+
+impl Tree for KdTree {
+    #[inline(always)]
+    fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    #[inline(always)]
+    fn root(&self) -> Node {
+        self.nodes[0]
+    }
+
+    #[inline(always)]
+    fn children(&self, inner: Node) -> [Node; 2] {
+        let below = inner.below() as usize;
+        [self.nodes[below], self.nodes[below + 1]]
+    }
+
+    #[inline(always)]
+    fn primitives(&self, leaf: Node) -> &[u32] {
+        &self.references[leaf.references()]
+    }
+
+    #[inline(always)]
+    fn corners(&self, primitive: u32) -> &Corners {
+        &self.triangles[primitive as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,47 +1,29 @@
-//! Instruction sets and their choice at run time.
+//! SIMD lanes and the run-time choice of an instruction set.
+//!
+//! A kernel is written once, generic over [`Lanes`], and handed to [`Chosen::run`] as a
+//! [`Task`]. `run` enters one function per instruction set that carries `#[target_feature]`;
+//! everything below it is `#[inline(always)]` and so is compiled for that instruction set.
+//! A stock build is therefore fast on every x86-64, and `wide` alone, which chooses at compile
+//! time, serves as the portable implementation and as the reference.
+//!
+//! No operation here fuses a multiplication with an addition: each is rounded on its own, so
+//! every instruction set gives the same bits, and the sign arguments of the watertight triangle
+//! test hold (a fused difference of products can have the wrong sign).
 
-use crate::error::{Error, Result};
+mod isa;
+mod lanes;
+mod portable;
+mod scalar;
 
-/// An instruction set that the kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Isa {
-    /// What the target guarantees (SSE2 on x86-64, NEON on AArch64), through `wide`.
-    Portable,
-    /// AVX2 with FMA and BMI.
-    Avx2,
-    /// AVX-512 F, VL, BW and DQ.
-    Avx512,
-}
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod pair;
 
-impl Isa {
-    /// All of them, plainest first.
-    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+pub use isa::{Chosen, Isa, Simd, Task};
+pub use lanes::{Lanes, Mask};
 
-    /// The best one that this machine has.
-    pub fn detect() -> Self {
-        Self::Portable
-    }
-
-    /// Those that this machine has, plainest first. Never empty.
-    pub fn available() -> Vec<Self> {
-        vec![Self::Portable]
-    }
-
-    /// The one that the environment variable `RAYPACK_ISA` names, else [`Isa::detect`].
-    ///
-    /// # Errors
-    /// The variable names no instruction set, or one that this machine lacks.
-    pub fn from_env() -> Result<Self> {
-        let _ = Error::option("RAYPACK_ISA", "");
-        Ok(Self::Portable)
-    }
-
-    /// `portable`, `avx2` or `avx512`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+//! The watertight ray-triangle test: Woop, Benthin & Wald, "Watertight Ray/Triangle
+//! Intersection", JCGT 2(1), 2013.
+//!
+//! The ray becomes the z axis: the coordinate in which its direction is greatest is renamed z,
+//! and a shear takes x and y along. What is left is whether the origin lies in a 2D triangle,
+//! decided by three edge functions. Two triangles that share an edge compute the same sheared
+//! corners and negated edge functions, bit for bit, so no ray passes between them.
+//!
+//! The sign of an edge function `a*b - c*d` is right whenever the result is not zero, because
+//! rounding is monotone and the products are rounded alike; where it is zero, double precision
+//! (in which products of two floats are exact) decides. That is why nothing here is fused.
+//!
+//! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
+//! it would only turn all three signs round.
+
+use super::Corners;
+use crate::simd::{Lanes, Mask};
+
+/// The axis that follows `axis`, cyclically.
+#[inline(always)]
+const fn next(axis: usize) -> usize {
+    if axis == 2 { 0 } else { axis + 1 }
+}
+
+/// Three coordinates, `W` lanes each.
+pub type Lanes3<L> = [L; 3];
+
+/// What the test needs to know of `W` rays: the shear that takes each to the z axis.
+#[derive(Clone, Copy)]
+pub struct Shear<const W: usize, L: Lanes<W>> {
+    /// The greatest axis of the directions if all lanes share it.
+    major: Option<usize>,
+    /// Lanes whose greatest axis is x, y; in the others it is z.
+    major_x: L::Mask,
+    major_y: L::Mask,
+    /// Origins in renamed coordinates: the third is along the greatest axis.
+    origin: Lanes3<L>,
+    /// `(dx/dz, dy/dz, 1/dz)` in renamed coordinates.
+    shear: Lanes3<L>,
+}
+
+/// Triangles that the lanes of a packet may have hit.
+pub struct Candidate<const W: usize, L: Lanes<W>> {
+    /// Lanes in which the line meets the triangle: `t` is not compared with anything yet.
+    pub inside: L::Mask,
+    /// The ray's parameter.
+    pub t: L,
+    /// Barycentric weight of the second corner.
+    pub u: L,
+    /// Barycentric weight of the third corner.
+    pub v: L,
+}
+
+impl<const W: usize, L: Lanes<W>> Shear<W, L> {
+    /// Prepares `W` rays. `active` has a bit for each lane that matters: the others do not keep
+    /// the fast path from being taken.
+    ///
+    /// A lane whose direction is zero or not finite gets a shear of NaNs, and so never a hit.
+    #[inline(always)]
+    pub fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {
+        let [x, y, z] = direction.map(Lanes::abs);
+        // Ties go to the earlier axis, so that every width picks alike.
+        let major_x = y.le(x) & z.le(x);
+        let major_y = !major_x & z.le(y);
+        let (bits_x, bits_y) = (major_x.bits() & active, major_y.bits() & active);
+        let major = if bits_x == active {
+            Some(0)
+        } else if bits_y == active {
+            Some(1)
+        } else if bits_x | bits_y == 0 {
+            Some(2)
+        } else {
+            None
+        };
+        let mut frame = Self { major, major_x, major_y, origin: *origin, shear: *direction };
+        let [ox, oy, oz] = frame.renamed(origin);
+        let [dx, dy, dz] = frame.renamed(direction);
+        frame.origin = [ox, oy, oz];
+        frame.shear = [dx / dz, dy / dz, L::splat(1.0) / dz];
+        frame
+    }
+
+    /// Coordinates renamed lane by lane so that each lane's greatest axis comes last.
+    #[inline(always)]
+    fn renamed(&self, [x, y, z]: &Lanes3<L>) -> Lanes3<L> {
+        let pick =
+            |if_x: L, if_y: L, if_z: L| L::select(self.major_x, if_x, L::select(self.major_y, if_y, if_z));
+        [pick(*y, *z, *x), pick(*z, *x, *y), pick(*x, *y, *z)]
+    }
+
+    /// One triangle against all lanes. Edges and corners belong to the triangle; a triangle seen
+    /// exactly edge-on, or without area, is never hit. NaN corners are never hit.
+    #[inline(always)]
+    pub fn test(&self, corners: &Corners) -> Candidate<W, L> {
+        // Translate the corners to the origins, with their coordinates renamed.
+        let translated = match self.major {
+            Some(axis) => {
+                let order = [next(axis), next(next(axis)), axis];
+                corners.map(|corner| std::array::from_fn(|i| L::splat(corner[order[i]]) - self.origin[i]))
+            }
+            None => corners.map(|corner| {
+                let renamed = self.renamed(&corner.map(L::splat));
+                std::array::from_fn::<L, 3, _>(|i| renamed[i] - self.origin[i])
+            }),
+        };
+
+        // Shear x and y so that the rays run along z.
+        let [[ax, ay], [bx, by], [cx, cy]] =
+            translated.map(|[x, y, z]| [x - self.shear[0] * z, y - self.shear[1] * z]);
+
+        // Edge functions: each is opposite to the corner whose weight it is.
+        let mut a = cx * by - cy * bx;
+        let mut b = ax * cy - ay * cx;
+        let mut c = bx * ay - by * ax;
+
+        // All of one sign, zeros allowed: not both a negative and a positive one.
+        let zero = L::splat(0.0);
+        let mut inside = !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+        if !inside.any() {
+            return Candidate { inside, t: zero, u: zero, v: zero };
+        }
+
+        // Where an edge function is zero, its sign is not known: ask double precision.
+        let unsure = (a.eq(zero) | b.eq(zero) | c.eq(zero)) & inside;
+        if unsure.any() {
+            let sheared = [ax, ay, bx, by, cx, cy].map(Lanes::store);
+            [a, b, c] =
+                edges_in_double(unsure.bits(), &sheared, [a, b, c].map(Lanes::store)).map(|e| L::load(&e));
+            inside = inside & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+        }
+
+        // The weights' sum is zero for a triangle seen edge-on, NaN where anything was NaN.
+        let sum = a + b + c;
+        inside = inside & (sum.lt(zero) | zero.lt(sum));
+
+        // Distance: the corners' depths, weighted.
+        let [az, bz, cz] = translated.map(|[_, _, z]| self.shear[2] * z);
+        let inverse = L::splat(1.0) / sum;
+        let t = (a * az + b * bz + c * cz) * inverse;
+        Candidate { inside, t, u: b * inverse, v: c * inverse }
+    }
+}
+
+/// The edge functions of the lanes in `lanes`, computed in double precision; those of the other
+/// lanes as they were. `sheared` is `ax ay bx by cx cy`.
+#[cold]
+#[inline(never)]
+fn edges_in_double<const W: usize>(
+    lanes: u32,
+    sheared: &[[f32; W]; 6],
+    mut edges: [[f32; W]; 3],
+) -> [[f32; W]; 3] {
+    for lane in (0..W).filter(|lane| lanes >> lane & 1 == 1) {
+        let [ax, ay, bx, by, cx, cy] = sheared.map(|s| f64::from(s[lane]));
+        let exact = [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax];
+        for (edge, exact) in edges.iter_mut().zip(exact) {
+            edge[lane] = to_f32_with_sign(exact);
+        }
+    }
+    edges
+}
+
+/// The nearest float, but never zero unless `x` is: a tiny value keeps its sign.
+fn to_f32_with_sign(x: f64) -> f32 {
+    let rounded = x as f32;
+    if rounded == 0.0 && x != 0.0 { f32::from_bits(1).copysign(x as f32) } else { rounded }
+}

@@ -1,0 +1,86 @@
+//! What the builder is free to choose.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// The deepest tree that the kernels have stack for.
+pub const MAX_DEPTH: usize = 64;
+
+/// Build settings. The defaults suit 16-ray packets on most models.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BuildParams {
+    /// SAH cost of a step through an inner node. Only its ratio to `intersection_cost` counts.
+    /// Raising the ratio gives larger leaves and a smaller tree: single rays like 0.5 to 1,
+    /// packets 1 to 3.
+    pub traversal_cost: f32,
+    /// SAH cost of testing one triangle.
+    pub intersection_cost: f32,
+    /// The part of a split's cost that is forgiven when it cuts off empty space, 0 to 1. Raising
+    /// it skips more air and costs nodes; 0.2 is a good start.
+    pub empty_bonus: f32,
+    /// A leaf of at most this many triangles is never split. Raising it makes the build quicker
+    /// and rays slower; 1 leaves it all to the SAH.
+    pub min_leaf: usize,
+    /// How many splits in a row may cost more than a leaf would, in the hope of a good one below.
+    pub bad_splits: u32,
+    /// Depth limit, at most 64; 0 derives it from the number of triangles.
+    pub max_depth: usize,
+    /// Bins per axis for nodes above `exact_below`, 8 to 1024.
+    pub bins: usize,
+    /// Nodes with fewer triangles than this are swept exactly, endpoint by endpoint.
+    pub exact_below: usize,
+    /// Greatest number of references per triangle, on average: it bounds the tree's size on
+    /// meshes that the SAH would duplicate without end (long slivers in a bundle).
+    pub max_duplication: f32,
+}
+
+impl Default for BuildParams {
+    fn default() -> Self {
+        Self {
+            traversal_cost: 1.5,
+            intersection_cost: 1.0,
+            empty_bonus: 0.2,
+            min_leaf: 2,
+            bad_splits: 2,
+            max_depth: 0,
+            bins: 64,
+            exact_below: 4096,
+            max_duplication: 12.0,
+        }
+    }
+}
+
+impl BuildParams {
+    /// Checks that every value makes sense.
+    ///
+    /// # Errors
+    /// [`Error::Option`] naming the first key that does not, and what is accepted.
+    pub fn check(&self) -> Result<()> {
+        let fail = |key: &str, what: &str| Err(Error::option(format!("build.{key}"), what));
+        let positive = |x: f32| x.is_finite() && x > 0.0;
+        if !positive(self.traversal_cost) {
+            fail("traversal_cost", "must be a positive number")
+        } else if !positive(self.intersection_cost) {
+            fail("intersection_cost", "must be a positive number")
+        } else if !(0.0..1.0).contains(&self.empty_bonus) {
+            fail("empty_bonus", "must be at least 0 and less than 1")
+        } else if !(1..=1 << 20).contains(&self.min_leaf) {
+            fail("min_leaf", "must be between 1 and 1048576")
+        } else if self.max_depth > MAX_DEPTH {
+            fail("max_depth", "must be at most 64 (0 derives it from the model)")
+        } else if !(8..=1024).contains(&self.bins) {
+            fail("bins", "must be between 8 and 1024")
+        } else if !(1.0..=1000.0).contains(&self.max_duplication) {
+            fail("max_duplication", "must be between 1 and 1000")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The depth limit for a number of triangles.
+    pub(super) fn depth_limit(&self, triangles: usize) -> usize {
+        let derived = || 12 + (1.6 * (triangles.max(1) as f64).log2()).round() as usize;
+        if self.max_depth == 0 { derived().min(MAX_DEPTH) } else { self.max_depth }
+    }
+}

@@ -1,0 +1,115 @@
+//! The surface area heuristic (MacDonald & Booth 1990): what a split is expected to cost.
+//!
+//! A ray that meets a cell meets a part of it with a probability of the ratio of their areas, so
+//! a split costs `traversal + intersection * (p_below n_below + p_above n_above)`.
+
+use super::params::BuildParams;
+use crate::geometry::Aabb;
+
+/// An axis-aligned plane that divides a cell, and the side on which triangles that lie in the
+/// plane go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Split {
+    /// 0, 1 or 2.
+    pub axis: usize,
+    /// Coordinate along the axis.
+    pub position: f32,
+    /// Whether triangles in the plane go below it.
+    pub planar_below: bool,
+    /// Expected cost, in the units of the parameters.
+    pub cost: f64,
+}
+
+/// The cost model of one cell.
+#[derive(Clone, Debug)]
+pub struct CellCost<'a> {
+    params: &'a BuildParams,
+    cell: Aabb,
+    inverse_area: f64,
+}
+
+impl<'a> CellCost<'a> {
+    /// The model for a cell; `None` if the cell has no area (a point or a line), where
+    /// probabilities mean nothing and no split can help.
+    pub fn new(params: &'a BuildParams, cell: Aabb) -> Option<Self> {
+        let area = cell.area();
+        (area > 0.0 && area.is_finite()).then(|| Self { params, cell, inverse_area: 1.0 / area })
+    }
+
+    /// What a leaf of `count` triangles costs.
+    pub fn leaf(&self, count: usize) -> f64 {
+        f64::from(self.params.intersection_cost) * count as f64
+    }
+
+    /// Prepares the planes across one axis.
+    pub fn axis(&self, axis: usize) -> AxisCost {
+        let low = f64::from(self.cell.min[axis]);
+        let high = f64::from(self.cell.max[axis]);
+        let extent = self.cell.max.as_dvec3() - self.cell.min.as_dvec3();
+        let (e1, e2) = (extent[(axis + 1) % 3], extent[(axis + 2) % 3]);
+        AxisCost {
+            axis,
+            low,
+            high,
+            cap: 2.0 * e1 * e2 * self.inverse_area,
+            wall: 2.0 * (e1 + e2) * self.inverse_area,
+            traversal: f64::from(self.params.traversal_cost),
+            intersection: f64::from(self.params.intersection_cost),
+            kept: 1.0 - f64::from(self.params.empty_bonus),
+        }
+    }
+}
+
+/// Costs of planes across one axis of a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct AxisCost {
+    axis: usize,
+    low: f64,
+    high: f64,
+    /// Area of both ends, relative to the cell's.
+    cap: f64,
+    /// Area of the walls for each unit of length, relative to the cell's.
+    wall: f64,
+    traversal: f64,
+    intersection: f64,
+    /// What is left of a cost when one side is empty.
+    kept: f64,
+}
+
+impl AxisCost {
+    /// The cost of a plane with `below` and `above` triangles on its sides, or infinity if the
+    /// plane divides nothing.
+    #[inline]
+    pub fn cost(&self, position: f32, below: usize, above: usize) -> f64 {
+        let x = f64::from(position);
+        let (flat_below, flat_above) = (x <= self.low, x >= self.high);
+        // A plane in a face cuts off a flat cell: that only helps if the triangles are divided.
+        if (flat_below || flat_above) && (below == 0 || above == 0) {
+            return f64::INFINITY;
+        }
+        let p_below = self.cap + self.wall * (x - self.low);
+        let p_above = self.cap + self.wall * (self.high - x);
+        let cost = self.traversal + self.intersection * (p_below * below as f64 + p_above * above as f64);
+        if below == 0 || above == 0 { cost * self.kept } else { cost }
+    }
+
+    /// The better of the two sides for `planar` triangles that lie in the plane.
+    #[inline]
+    pub fn split(&self, position: f32, below: usize, planar: usize, above: usize) -> Split {
+        let with_below = self.cost(position, below + planar, above);
+        let with_above = if planar == 0 { with_below } else { self.cost(position, below, above + planar) };
+        let planar_below = with_below <= with_above;
+        Split { axis: self.axis, position, planar_below, cost: with_below.min(with_above) }
+    }
+}
+
+/// The cheaper of two splits; the first where they cost the same, so that the result does not
+/// depend on anything but the order in which planes are visited.
+#[inline]
+pub fn cheaper(best: Option<Split>, candidate: Split) -> Option<Split> {
+    match best {
+        Some(best) if best.cost <= candidate.cost => Some(best),
+        _ if candidate.cost.is_finite() => Some(candidate),
+        _ => best,
+    }
+}

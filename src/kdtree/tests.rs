@@ -1,0 +1,166 @@
+//! Trees of small meshes: whole, tight, bounded, and the same for any number of threads.
+
+use super::*;
+use crate::mesh::Colors;
+use glam::Vec3;
+
+/// A generator of numbers for tests (SplitMix64).
+pub(crate) struct Numbers(pub u64);
+
+impl Numbers {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// Uniform in 0..1.
+    pub(crate) fn unit(&mut self) -> f32 {
+        (self.next() >> 40) as f32 / (1 << 24) as f32
+    }
+
+    pub(crate) fn point(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+fn mesh_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
+    let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
+    let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh { positions, triangles, colors: Colors::default() }
+}
+
+pub(crate) fn soup(count: usize, size: f32, seed: u64) -> Mesh {
+    let mut numbers = Numbers(seed);
+    mesh_of((0..count).map(|_| {
+        let at = numbers.point() * 10.0;
+        [0; 3].map(|_| at + (numbers.point() - 0.5) * size)
+    }))
+}
+
+/// Soup with its coordinates rounded to integers: flat, axis-aligned and coincident triangles.
+fn lattice(count: usize, seed: u64) -> Mesh {
+    let mut mesh = soup(count, 4.0, seed);
+    for position in &mut mesh.positions {
+        *position = position.round();
+    }
+    mesh
+}
+
+fn checked(mesh: &Mesh, params: &BuildParams) -> TreeStats {
+    let tree = KdTree::build(mesh, params, None).expect("builds");
+    tree.validate().expect("is whole");
+    tree.stats()
+}
+
+#[test]
+fn trees_are_whole() {
+    let params = [
+        BuildParams::default(),
+        BuildParams { exact_below: 0, bins: 8, min_leaf: 1, ..Default::default() },
+        BuildParams { exact_below: usize::MAX, empty_bonus: 0.0, traversal_cost: 0.2, ..Default::default() },
+    ];
+    for params in &params {
+        for seed in 0..4 {
+            checked(&soup(500, 0.5, seed), params);
+            checked(&soup(200, 8.0, seed), params);
+            checked(&lattice(500, seed), params);
+        }
+    }
+}
+
+#[test]
+fn a_large_soup_pays_off() {
+    let stats = checked(&soup(20_000, 0.2, 1), &BuildParams::default());
+    assert!(stats.expected_tests < 60.0, "{stats:?}");
+    assert!(stats.references_per_triangle < 6.0, "{stats:?}");
+    assert!(stats.depth <= 36);
+    assert_eq!(stats.leaf_histogram.iter().sum::<usize>(), stats.leaves);
+}
+
+#[test]
+fn coincident_triangles_end_in_one_leaf() {
+    let one = soup(1, 1.0, 7).positions;
+    let mesh = mesh_of(std::iter::repeat_n([one[0], one[1], one[2]], 1000));
+    let stats = checked(&mesh, &BuildParams::default());
+    assert_eq!(stats.largest_leaf, 1000);
+    assert!(stats.references <= 12_000 + 1024);
+}
+
+#[test]
+fn degenerate_meshes_build() {
+    let point = Vec3::new(1.0, 2.0, 3.0);
+    checked(&mesh_of([[point; 3]]), &BuildParams::default());
+    checked(&mesh_of(vec![[point; 3]; 100]), &BuildParams::default());
+    // All on one line, and all in one plane.
+    checked(
+        &mesh_of((0..100).map(|i| [0.0, 1.0, 2.0].map(|x| Vec3::X * (x + i as f32)))),
+        &BuildParams::default(),
+    );
+    let mut flat = soup(300, 1.0, 3);
+    flat.positions.iter_mut().for_each(|p| p.y = 0.25);
+    checked(&flat, &BuildParams { min_leaf: 1, ..Default::default() });
+}
+
+#[test]
+fn a_bundle_of_slivers_stays_within_its_budget() {
+    let mut numbers = Numbers(11);
+    let mesh = mesh_of((0..2000).map(|_| {
+        let jitter = numbers.point() * 0.05;
+        [Vec3::ZERO + jitter, Vec3::ONE * 10.0 + jitter, Vec3::ONE * 10.0 + jitter + Vec3::X * 1e-4]
+    }));
+    let params = BuildParams { traversal_cost: 0.05, max_duplication: 4.0, ..Default::default() };
+    let stats = checked(&mesh, &params);
+    assert!(stats.references <= 4 * 2000 + 1024, "{stats:?}");
+}
+
+#[test]
+fn the_tree_does_not_depend_on_threads() {
+    let mesh = soup(30_000, 0.3, 5);
+    let build = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| KdTree::build(&mesh, &BuildParams::default(), None).expect("builds"))
+    };
+    let (one, four) = (build(1), build(4));
+    assert_eq!(one.nodes, four.nodes);
+    assert_eq!(one.references, four.references);
+}
+
+#[test]
+fn bad_meshes_are_refused() {
+    let good = soup(1, 1.0, 0);
+    let build = |mesh: &Mesh| KdTree::build(mesh, &BuildParams::default(), None).map(drop);
+    let mut mesh = good.clone();
+    mesh.triangles.clear();
+    assert!(build(&mesh).unwrap_err().to_string().contains("no triangles"));
+    mesh = good.clone();
+    mesh.triangles[0][1] = 3;
+    assert!(build(&mesh).unwrap_err().to_string().contains("names vertex 3"));
+    for bad in [f32::NAN, f32::INFINITY] {
+        mesh = good.clone();
+        mesh.positions[2].y = bad;
+        assert!(build(&mesh).unwrap_err().to_string().contains("not finite"));
+    }
+    let params = BuildParams { bins: 1, ..Default::default() };
+    assert!(KdTree::build(&good, &params, None).unwrap_err().to_string().contains("build.bins"));
+}
+
+#[test]
+fn validate_sees_what_is_broken() {
+    let mesh = soup(300, 1.0, 2);
+    let build = || KdTree::build(&mesh, &BuildParams::default(), None).expect("builds");
+    let fault = |change: fn(&mut KdTree)| {
+        let mut tree = build();
+        change(&mut tree);
+        tree.validate().expect_err("something is broken")
+    };
+    assert!(fault(|t| t.references[5] = t.references[6] ^ 1).contains("missing from a leaf"));
+    assert!(fault(|t| t.references[0] = 300).contains("names triangle"));
+    assert!(fault(|t| t.nodes[0] = Node::inner(0, 5.0, t.nodes.len() - 1)).contains("children would be at"));
+    assert!(fault(|t| t.nodes[0] = Node::inner(t.nodes[0].axis(), 1e9, 2)).contains("outside of its cell"));
+    let circle = |t: &mut KdTree| t.nodes[3] = Node::inner(t.nodes[3].axis(), t.nodes[3].split(), 2);
+    assert!(fault(circle).contains("two parents"));
+    assert!(fault(|t| t.references.push(0)).contains("belongs to no leaf"));
+}

@@ -1,0 +1,161 @@
+//! AVX-512: 16 lanes in a ZMM register, masks in mask registers; 4 and 8 lanes as for AVX2.
+//!
+//! # Safety
+//! As in `avx2.rs`: the type here is named by [`Avx512`] alone, which is instantiated only in
+//! the `#[target_feature]` entry that a [`super::Chosen`] reaches after the machine was asked.
+
+use super::avx2;
+use super::isa::Simd;
+use super::lanes::{Lanes, Mask};
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+
+/// AVX-512 F, VL, BW and DQ.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512;
+
+impl Simd for Avx512 {
+    type F4 = avx2::F32x4;
+    type F8 = avx2::F32x8;
+    type F16 = F32x16;
+}
+
+/// Calls an intrinsic. The one `unsafe` of this file.
+macro_rules! avx512 {
+    ($call:expr) => {
+        // SAFETY: this runs only on machines that have AVX-512 (see the head of the file); loads
+        // and stores go through references to arrays of exactly the vector's size.
+        unsafe { $call }
+    };
+}
+
+/// Floats in one register.
+#[derive(Clone, Copy, Debug)]
+pub struct F32x16(__m512);
+
+/// One bit a lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Mask16(__mmask16);
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $intrinsic:ident) => {
+        impl $trait for F32x16 {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(avx512!($intrinsic(self.0, other.0)))
+            }
+        }
+    };
+}
+
+operator!(Add, add, _mm512_add_ps);
+operator!(Sub, sub, _mm512_sub_ps);
+operator!(Mul, mul, _mm512_mul_ps);
+operator!(Div, div, _mm512_div_ps);
+
+impl BitAnd for Mask16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl BitOr for Mask16 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl Not for Mask16 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+impl Mask for Mask16 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
+impl Lanes<16> for F32x16 {
+    type Mask = Mask16;
+    type Ids = __m512i;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(avx512!(_mm512_set1_ps(value)))
+    }
+    #[inline(always)]
+    fn load(values: &[f32; 16]) -> Self {
+        Self(avx512!(_mm512_loadu_ps(values.as_ptr())))
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 16] {
+        let mut values = [0.0; 16];
+        avx512!(_mm512_storeu_ps(values.as_mut_ptr(), self.0));
+        values
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(avx512!(_mm512_min_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(avx512!(_mm512_max_ps(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(avx512!(_mm512_andnot_ps(_mm512_set1_ps(-0.0), self.0)))
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        let bit = avx512!(_mm512_set1_ps(-0.0));
+        Self(avx512!(_mm512_or_ps(_mm512_andnot_ps(bit, self.0), _mm512_and_ps(bit, sign.0))))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Mask16 {
+        Mask16(avx512!(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Mask16 {
+        Mask16(avx512!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> Mask16 {
+        Mask16(avx512!(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn select(mask: Mask16, a: Self, b: Self) -> Self {
+        Self(avx512!(_mm512_mask_blend_ps(mask.0, b.0, a.0)))
+    }
+    #[inline(always)]
+    fn mask_from_bits(bits: u32) -> Mask16 {
+        Mask16(bits as u16)
+    }
+    #[inline(always)]
+    fn ids(id: i32) -> __m512i {
+        avx512!(_mm512_set1_epi32(id))
+    }
+    #[inline(always)]
+    fn ids_less(a: __m512i, b: __m512i) -> Mask16 {
+        Mask16(avx512!(_mm512_cmplt_epi32_mask(a, b)))
+    }
+    #[inline(always)]
+    fn ids_select(mask: Mask16, a: __m512i, b: __m512i) -> __m512i {
+        avx512!(_mm512_mask_blend_epi32(mask.0, b, a))
+    }
+    #[inline(always)]
+    fn ids_store(ids: __m512i) -> [i32; 16] {
+        let mut values = [0; 16];
+        avx512!(_mm512_storeu_si512(values.as_mut_ptr().cast(), ids));
+        values
+    }
+}

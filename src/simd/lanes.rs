@@ -1,0 +1,65 @@
+//! What a vector of `W` floats can do.
+
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+
+/// One bit a lane: the result of comparing [`Lanes`].
+pub trait Mask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
+    /// Bit `i` of the result is lane `i`; bits beyond the width are 0.
+    fn bits(self) -> u32;
+
+    /// Whether any lane is set.
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+}
+
+/// `W` floats, and `W` integers beside them for primitive ids.
+///
+/// Every operation rounds exactly as IEEE 754 binary32 does, lane by lane, so that all
+/// implementations agree bit for bit.
+pub trait Lanes<const W: usize>:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// What a comparison gives.
+    type Mask: Mask;
+    /// `W` signed 32-bit integers.
+    type Ids: Copy;
+
+    /// The same value in every lane.
+    fn splat(value: f32) -> Self;
+    /// Lane `i` is `values[i]`.
+    fn load(values: &[f32; W]) -> Self;
+    /// Lane `i` becomes element `i`.
+    fn store(self) -> [f32; W];
+
+    /// `self < other ? self : other`, lane by lane: **`other` where either is NaN**.
+    fn min(self, other: Self) -> Self;
+    /// `self > other ? self : other`, lane by lane: **`other` where either is NaN**.
+    fn max(self, other: Self) -> Self;
+    /// The magnitude: the sign bit cleared, NaN included.
+    fn abs(self) -> Self;
+    /// The magnitude of `self` with the sign bit of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+
+    /// `self < other`; false where either is NaN.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `self <= other`; false where either is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// `self == other`; false where either is NaN.
+    fn eq(self, other: Self) -> Self::Mask;
+
+    /// `mask ? a : b`, lane by lane.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// The mask whose lane `i` is bit `i` of `bits`.
+    fn mask_from_bits(bits: u32) -> Self::Mask;
+
+    /// The same id in every lane.
+    fn ids(id: i32) -> Self::Ids;
+    /// `a < b`, signed.
+    fn ids_less(a: Self::Ids, b: Self::Ids) -> Self::Mask;
+    /// `mask ? a : b`, lane by lane.
+    fn ids_select(mask: Self::Mask, a: Self::Ids, b: Self::Ids) -> Self::Ids;
+    /// Lane `i` becomes element `i`.
+    fn ids_store(ids: Self::Ids) -> [i32; W];
+}

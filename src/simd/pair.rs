@@ -1,0 +1,134 @@
+//! Twice the lanes: two vectors that act as one, for instruction sets narrower than a packet.
+
+use super::lanes::{Lanes, Mask};
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+
+/// Lanes `0..W/2` in the first, the others in the second.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair<T>(T, T);
+
+macro_rules! operator {
+    ($trait:ident, $method:ident) => {
+        impl<T: $trait<Output = T>> $trait for Pair<T> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    };
+}
+
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+operator!(BitAnd, bitand);
+operator!(BitOr, bitor);
+
+impl<T: Not<Output = T>> Not for Pair<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0, !self.1)
+    }
+}
+
+/// The halves of an array.
+#[inline(always)]
+fn halves(values: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
+    let (low, high) = values.split_at(8);
+    (low.try_into().expect("8 of 16"), high.try_into().expect("8 of 16"))
+}
+
+/// The array of two halves.
+#[inline(always)]
+fn joined<T: Copy + Default>(low: [T; 8], high: [T; 8]) -> [T; 16] {
+    let mut all = [T::default(); 16];
+    all[..8].copy_from_slice(&low);
+    all[8..].copy_from_slice(&high);
+    all
+}
+
+/// A mask of 8 + 8 lanes.
+impl<M: Mask> Mask for Pair<M> {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self.0.bits() | self.1.bits() << 8
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        (self.0 | self.1).any()
+    }
+}
+
+impl<L: Lanes<8>> Lanes<16> for Pair<L> {
+    type Mask = Pair<L::Mask>;
+    type Ids = Pair<L::Ids>;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(L::splat(value), L::splat(value))
+    }
+    #[inline(always)]
+    fn load(values: &[f32; 16]) -> Self {
+        let (low, high) = halves(values);
+        Self(L::load(low), L::load(high))
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 16] {
+        joined(self.0.store(), self.1.store())
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0), self.1.min(other.1))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0), self.1.max(other.1))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        Self(self.0.copysign(sign.0), self.1.copysign(sign.1))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        Pair(self.0.lt(other.0), self.1.lt(other.1))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Self::Mask {
+        Pair(self.0.le(other.0), self.1.le(other.1))
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> Self::Mask {
+        Pair(self.0.eq(other.0), self.1.eq(other.1))
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+        Self(L::select(mask.0, a.0, b.0), L::select(mask.1, a.1, b.1))
+    }
+    #[inline(always)]
+    fn mask_from_bits(bits: u32) -> Self::Mask {
+        Pair(L::mask_from_bits(bits & 0xff), L::mask_from_bits(bits >> 8))
+    }
+    #[inline(always)]
+    fn ids(id: i32) -> Self::Ids {
+        Pair(L::ids(id), L::ids(id))
+    }
+    #[inline(always)]
+    fn ids_less(a: Self::Ids, b: Self::Ids) -> Self::Mask {
+        Pair(L::ids_less(a.0, b.0), L::ids_less(a.1, b.1))
+    }
+    #[inline(always)]
+    fn ids_select(mask: Self::Mask, a: Self::Ids, b: Self::Ids) -> Self::Ids {
+        Pair(L::ids_select(mask.0, a.0, b.0), L::ids_select(mask.1, a.1, b.1))
+    }
+    #[inline(always)]
+    fn ids_store(ids: Self::Ids) -> [i32; 16] {
+        joined(L::ids_store(ids.0), L::ids_store(ids.1))
+    }
+}

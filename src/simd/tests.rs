@@ -1,0 +1,99 @@
+//! Every implementation against plain scalar arithmetic, on ordinary and on special values.
+
+use super::*;
+
+/// Pairs of values that tell rules apart: signs of zero, NaN, infinities, denormals.
+const VALUES: [f32; 14] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1.5,
+    -3.25,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    1e-40,
+    -1e-40,
+    f32::MAX,
+    f32::MIN_POSITIVE,
+    0.1,
+];
+
+/// Checks every operation of one lane type against `f32`'s own lane type.
+fn check<const W: usize, L: Lanes<W>>() {
+    let n = VALUES.len();
+    for shift in 0..n * n {
+        let a: [f32; W] = std::array::from_fn(|i| VALUES[(shift + i) % n]);
+        let b: [f32; W] = std::array::from_fn(|i| VALUES[(shift / n + i * 5) % n]);
+        let (x, y) = (L::load(&a), L::load(&b));
+
+        let same = |name: &str, got: L, want: fn(f32, f32) -> f32| {
+            for (i, got) in got.store().into_iter().enumerate() {
+                let want = want(a[i], b[i]);
+                let equal = got.to_bits() == want.to_bits() || (got.is_nan() && want.is_nan());
+                assert!(equal, "{name}({}, {}) is {got}, not {want}", a[i], b[i]);
+            }
+        };
+        same("add", x + y, |a, b| a + b);
+        same("sub", x - y, |a, b| a - b);
+        same("mul", x * y, |a, b| a * b);
+        same("div", x / y, |a, b| a / b);
+        same("min", x.min(y), Lanes::min);
+        same("max", x.max(y), Lanes::max);
+        same("abs", x.abs(), |a, _| a.abs());
+        same("copysign", x.copysign(y), |a, b| a.copysign(b));
+
+        let bits = |f: fn(f32, f32) -> bool| (0..W).fold(0, |m, i| m | u32::from(f(a[i], b[i])) << i);
+        assert_eq!(x.lt(y).bits(), bits(|a, b| a < b));
+        assert_eq!(x.le(y).bits(), bits(|a, b| a <= b));
+        assert_eq!(x.eq(y).bits(), bits(|a, b| a == b));
+        let full = (1u64 << W) as u32 - 1;
+        assert_eq!((!x.lt(y)).bits() & full, !bits(|a, b| a < b) & full);
+        assert_eq!((x.lt(y) | x.eq(y)).bits(), bits(|a, b| a <= b));
+        assert_eq!((x.le(y) & x.eq(y)).bits(), bits(|a, b| a == b));
+        assert_eq!(x.lt(y).any(), bits(|a, b| a < b) != 0);
+
+        let pattern = (shift as u32).wrapping_mul(2654435761) & full;
+        let mask = L::mask_from_bits(pattern);
+        assert_eq!(mask.bits() & full, pattern);
+        let picked = L::select(mask, x, y).store();
+        for i in 0..W {
+            let want = if pattern >> i & 1 == 1 { a[i] } else { b[i] };
+            assert_eq!(picked[i].to_bits(), want.to_bits());
+        }
+
+        let ids = L::ids_select(mask, L::ids(shift as i32), L::ids(i32::MAX));
+        for (i, id) in L::ids_store(ids).into_iter().enumerate() {
+            assert_eq!(id, if pattern >> i & 1 == 1 { shift as i32 } else { i32::MAX });
+        }
+        assert_eq!(L::ids_less(ids, L::ids(shift as i32 + 1)).bits() & full, pattern);
+    }
+}
+
+struct CheckAll;
+
+impl Task for CheckAll {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        check::<4, S::F4>();
+        check::<8, S::F8>();
+        check::<16, S::F16>();
+    }
+}
+
+#[test]
+fn every_instruction_set_computes_as_scalars_do() {
+    check::<1, f32>();
+    for isa in Isa::available() {
+        Chosen::new(isa).expect("available").run(CheckAll);
+    }
+}
+
+#[test]
+fn what_is_detected_is_available() {
+    assert!(Isa::available().contains(&Isa::detect()));
+    assert!(Isa::available().contains(&Isa::Portable));
+}

@@ -1,0 +1,198 @@
+//! A mesh made ready for tracing, and the calls that trace.
+
+use super::kernel::Kernel;
+use super::lanes::{HitPacket, PacketWidth, RayPacket};
+use super::packet;
+use crate::error::Result;
+use crate::geometry::{Aabb, Hit, Ray};
+use crate::kdtree::{BuildParams, BuildProgress, KdTree, Tree, TreeStats};
+use crate::mesh::Mesh;
+use crate::simd::{Chosen, Isa, Simd, Task};
+
+/// A mesh made ready for tracing: its tree, and the instruction set to trace with.
+///
+/// Shared freely between threads: tracing changes nothing.
+#[derive(Debug)]
+pub struct Accel {
+    tree: KdTree,
+    chosen: Chosen,
+}
+
+impl Accel {
+    /// Builds the tree of a mesh. Primitive ids of hits are indices into `mesh.triangles`.
+    ///
+    /// # Errors
+    /// As [`KdTree::build`].
+    pub fn build(mesh: &Mesh, params: &BuildParams) -> Result<Self> {
+        Ok(Self::of_tree(KdTree::build(mesh, params, None)?))
+    }
+
+    /// The same, with progress to be read from another thread.
+    ///
+    /// # Errors
+    /// As [`KdTree::build`].
+    pub fn build_with_progress(mesh: &Mesh, params: &BuildParams, progress: &BuildProgress) -> Result<Self> {
+        Ok(Self::of_tree(KdTree::build(mesh, params, Some(progress))?))
+    }
+
+    /// Wraps a tree, to be traced with the best instruction set that the machine has.
+    pub fn of_tree(tree: KdTree) -> Self {
+        Self { tree, chosen: Chosen::best() }
+    }
+
+    /// The same, traced with another instruction set. Panics if this machine lacks it.
+    pub fn with_isa(mut self, isa: Isa) -> Self {
+        self.set_isa(isa);
+        self
+    }
+
+    /// Chooses the instruction set. Panics if this machine lacks it.
+    pub fn set_isa(&mut self, isa: Isa) {
+        self.chosen = Chosen::new(isa).unwrap_or_else(|| panic!("this machine has no {isa}"));
+    }
+
+    /// The instruction set in use.
+    pub fn isa(&self) -> Isa {
+        self.chosen.isa()
+    }
+
+    /// The tree.
+    pub fn tree(&self) -> &KdTree {
+        &self.tree
+    }
+
+    /// The box around all triangles.
+    pub fn bounds(&self) -> Aabb {
+        *self.tree.bounds()
+    }
+
+    /// Figures about the tree. Walks all of it.
+    pub fn stats(&self) -> TreeStats {
+        self.tree.stats()
+    }
+
+    /// The closest hit of one ray.
+    pub fn intersect(&self, ray: &Ray) -> Hit {
+        self.intersect_packet(&RayPacket::<1>::of_slice(&[*ray]), 1).get(0)
+    }
+
+    /// Whether anything lies in one ray's interval.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.occluded_packet(&RayPacket::<1>::of_slice(&[*ray]), 1) == 1
+    }
+
+    /// The closest hits of the lanes whose bit is set in `active`; the others come out as misses.
+    #[inline]
+    pub fn intersect_packet<const W: usize>(&self, rays: &RayPacket<W>, active: u32) -> HitPacket<W>
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        self.chosen.run(IntersectPacket { tree: &self.tree, rays, active: active & lanes_of(W) })
+    }
+
+    /// A bit for each lane set in `active` in whose interval anything lies.
+    #[inline]
+    pub fn occluded_packet<const W: usize>(&self, rays: &RayPacket<W>, active: u32) -> u32
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        self.chosen.run(OccludedPacket { tree: &self.tree, rays, active: active & lanes_of(W) })
+    }
+
+    /// The closest hit of each ray, by the kernel named: for packets, rays that follow one
+    /// another go together. Panics if the slices' lengths differ.
+    pub fn intersect_many(&self, kernel: Kernel, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
+        match kernel {
+            Kernel::Single => self.intersect_slices::<1>(rays, hits),
+            Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
+            Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
+            Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
+        }
+    }
+
+    /// Whether anything lies in each ray's interval, by the kernel named. Panics if the slices'
+    /// lengths differ.
+    pub fn occluded_many(&self, kernel: Kernel, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
+        match kernel {
+            Kernel::Single => self.occluded_slices::<1>(rays, occluded),
+            Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
+            Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
+            Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
+        }
+    }
+
+    fn intersect_slices<const W: usize>(&self, rays: &[Ray], hits: &mut [Hit])
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        for (rays, hits) in rays.chunks(W).zip(hits.chunks_mut(W)) {
+            let found = self.intersect_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = found.get(lane);
+            }
+        }
+    }
+
+    fn occluded_slices<const W: usize>(&self, rays: &[Ray], occluded: &mut [bool])
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
+            let found = self.occluded_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
+            for (lane, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = found >> lane & 1 == 1;
+            }
+        }
+    }
+}
+
+/// The first `count` lanes, at most 16.
+const fn lanes_of(count: usize) -> u32 {
+    (1 << count) - 1
+}
+
+struct IntersectPacket<'a, const W: usize> {
+    tree: &'a KdTree,
+    rays: &'a RayPacket<W>,
+    active: u32,
+}
+
+impl<const W: usize> Task for IntersectPacket<'_, W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    type Output = HitPacket<W>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> HitPacket<W> {
+        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _>(
+            self.tree,
+            self.rays,
+            self.active,
+        )
+    }
+}
+
+struct OccludedPacket<'a, const W: usize> {
+    tree: &'a KdTree,
+    rays: &'a RayPacket<W>,
+    active: u32,
+}
+
+impl<const W: usize> Task for OccludedPacket<'_, W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _>(
+            self.tree,
+            self.rays,
+            self.active,
+        )
+    }
+}

@@ -1,0 +1,52 @@
+//! The list of kernels: tests and benches run every entry.
+
+use std::fmt;
+
+/// A way of tracing rays. All give the same hits, bit for bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kernel {
+    /// One ray at a time.
+    Single,
+    /// Four rays in SIMD lanes.
+    Packet4,
+    /// Eight.
+    Packet8,
+    /// Sixteen.
+    Packet16,
+}
+
+impl Kernel {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16];
+
+    /// `single`, `packet4`, `packet8` or `packet16`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Packet4 => "packet4",
+            Self::Packet8 => "packet8",
+            Self::Packet16 => "packet16",
+        }
+    }
+
+    /// How many rays it traces together.
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Single => 1,
+            Self::Packet4 => 4,
+            Self::Packet8 => 8,
+            Self::Packet16 => 16,
+        }
+    }
+
+    /// The kernel that traces `width` rays together, if there is one.
+    pub fn of_width(width: usize) -> Option<Self> {
+        Self::ALL.into_iter().find(|kernel| kernel.width() == width)
+    }
+}
+
+impl fmt::Display for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}

@@ -1,0 +1,122 @@
+//! Rays and hits component by component, as the packet kernels take and give them.
+
+use crate::geometry::{Hit, NO_PRIMITIVE, Ray};
+use crate::simd::{Lanes, Simd};
+use glam::Vec3;
+
+/// `W` rays, component by component. `W` is 1, 4, 8 or 16.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct RayPacket<const W: usize> {
+    /// Origins: `origin[axis][lane]`.
+    pub origin: [[f32; W]; 3],
+    /// Directions, of any length but zero: `direction[axis][lane]`.
+    pub direction: [[f32; W]; 3],
+    /// Least parameters that count.
+    pub tnear: [f32; W],
+    /// Greatest parameters that count.
+    pub tfar: [f32; W],
+}
+
+impl<const W: usize> RayPacket<W> {
+    /// A packet of rays with empty intervals, which hit nothing.
+    pub const fn empty() -> Self {
+        Self { origin: [[0.0; W]; 3], direction: [[1.0; W]; 3], tnear: [0.0; W], tfar: [-1.0; W] }
+    }
+
+    /// The rays of a slice in order, at most `W`; lanes beyond its end are empty.
+    pub fn of_slice(rays: &[Ray]) -> Self {
+        let mut packet = Self::empty();
+        for (lane, ray) in rays.iter().enumerate() {
+            packet.set(lane, ray);
+        }
+        packet
+    }
+
+    /// Puts a ray into a lane. Panics if there is no such lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, ray: &Ray) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+        self.tnear[lane] = ray.tnear;
+        self.tfar[lane] = ray.tfar;
+    }
+
+    /// The ray in a lane. Panics if there is no such lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Ray {
+        let vector = |v: &[[f32; W]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        Ray {
+            origin: vector(&self.origin),
+            tnear: self.tnear[lane],
+            direction: vector(&self.direction),
+            tfar: self.tfar[lane],
+        }
+    }
+}
+
+/// `W` hits, component by component; a miss as in [`Hit::MISS`].
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct HitPacket<const W: usize> {
+    /// Parameters, infinite for misses.
+    pub t: [f32; W],
+    /// Barycentric weights of the second corner.
+    pub u: [f32; W],
+    /// Barycentric weights of the third corner.
+    pub v: [f32; W],
+    /// Primitive ids.
+    pub primitive: [u32; W],
+    /// Geometric normals, not normalised: `normal[axis][lane]`.
+    pub normal: [[f32; W]; 3],
+}
+
+impl<const W: usize> HitPacket<W> {
+    /// A packet of misses.
+    pub const fn miss() -> Self {
+        Self {
+            t: [f32::INFINITY; W],
+            u: [0.0; W],
+            v: [0.0; W],
+            primitive: [NO_PRIMITIVE; W],
+            normal: [[0.0; W]; 3],
+        }
+    }
+
+    /// The hit in a lane. Panics if there is no such lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Hit {
+        Hit {
+            t: self.t[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            primitive: self.primitive[lane],
+            normal: Vec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]),
+        }
+    }
+}
+
+/// The widths that there are kernels for, and the vectors that they use: implemented for
+/// `RayPacket<1>`, `<4>`, `<8>` and `<16>`.
+pub trait PacketWidth<const W: usize> {
+    /// `W` floats in an instruction set.
+    type Lanes<S: Simd>: Lanes<W>;
+}
+
+impl PacketWidth<1> for RayPacket<1> {
+    type Lanes<S: Simd> = f32;
+}
+
+impl PacketWidth<4> for RayPacket<4> {
+    type Lanes<S: Simd> = S::F4;
+}
+
+impl PacketWidth<8> for RayPacket<8> {
+    type Lanes<S: Simd> = S::F8;
+}
+
+impl PacketWidth<16> for RayPacket<16> {
+    type Lanes<S: Simd> = S::F16;
+}

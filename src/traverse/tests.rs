@@ -1,0 +1,99 @@
+//! Small checks of the kernels; the large ones are in `tests/`.
+
+use super::*;
+use crate::geometry::{Hit, Ray};
+use crate::kdtree::BuildParams;
+use crate::mesh::{Colors, Mesh};
+use crate::simd::Isa;
+use glam::Vec3;
+
+/// A unit square in the plane z = 0, as two triangles.
+fn square() -> Accel {
+    let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y];
+    let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], colors: Colors::default() };
+    Accel::build(&mesh, &BuildParams::default()).expect("builds")
+}
+
+fn for_every_kernel(check: impl Fn(&Accel, Kernel, &str)) {
+    for isa in Isa::available() {
+        let accel = square().with_isa(isa);
+        for kernel in Kernel::ALL {
+            check(&accel, kernel, &format!("{kernel} on {isa}"));
+        }
+    }
+}
+
+fn intersect(accel: &Accel, kernel: Kernel, ray: Ray) -> Hit {
+    let mut hits = [Hit::MISS; 19];
+    accel.intersect_many(kernel, &[ray; 19], &mut hits);
+    assert!(hits.iter().all(|h| *h == hits[0]));
+    let mut occluded = [false; 19];
+    accel.occluded_many(kernel, &[ray; 19], &mut occluded);
+    assert!(occluded.iter().all(|&o| o == hits[0].is_hit()));
+    hits[0]
+}
+
+#[test]
+fn a_hit_is_what_its_fields_say() {
+    for_every_kernel(|accel, kernel, name| {
+        let ray = Ray::new(Vec3::new(0.75, 0.25, 2.0), Vec3::new(0.0, 0.0, -4.0));
+        let hit = intersect(accel, kernel, ray);
+        assert_eq!(hit, Hit { t: 0.5, u: 0.5, v: 0.25, primitive: 0, normal: Vec3::Z }, "{name}");
+    });
+}
+
+#[test]
+fn both_ends_of_the_interval_count() {
+    for_every_kernel(|accel, kernel, name| {
+        let shot = |tnear, tfar| {
+            let ray = Ray::segment(Vec3::new(0.25, 0.75, 1.0), Vec3::new(0.0, 0.0, -1.0), tnear, tfar);
+            intersect(accel, kernel, ray).is_hit()
+        };
+        assert!(shot(1.0, 1.0), "{name}");
+        assert!(shot(0.0, 1.0) && shot(1.0, 9.0), "{name}");
+        assert!(!shot(0.0, 1.0f32.next_down()) && !shot(1.0f32.next_up(), 9.0), "{name}");
+        assert!(!shot(2.0, 0.5), "an empty interval, {name}");
+    });
+}
+
+#[test]
+fn the_lower_id_wins_on_the_shared_edge() {
+    for_every_kernel(|accel, kernel, name| {
+        let hit = intersect(accel, kernel, Ray::new(Vec3::new(0.5, 0.5, 1.0), -Vec3::Z));
+        assert_eq!((hit.primitive, hit.t), (0, 1.0), "{name}");
+    });
+}
+
+#[test]
+fn what_is_no_ray_hits_nothing() {
+    for_every_kernel(|accel, kernel, name| {
+        let good = Ray::new(Vec3::new(0.5, 0.25, 1.0), -Vec3::Z);
+        assert!(intersect(accel, kernel, good).is_hit());
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for axis in 0..3 {
+                let mut ray = good;
+                ray.origin[axis] = bad;
+                assert!(!intersect(accel, kernel, ray).is_hit(), "{name}: {ray:?}");
+                ray = good;
+                ray.direction[axis] = bad;
+                assert!(!intersect(accel, kernel, ray).is_hit(), "{name}: {ray:?}");
+            }
+        }
+        let nan = f32::NAN;
+        assert!(!intersect(accel, kernel, Ray { tnear: nan, ..good }).is_hit(), "{name}");
+        assert!(!intersect(accel, kernel, Ray { tfar: nan, ..good }).is_hit(), "{name}");
+        assert!(!intersect(accel, kernel, Ray { direction: Vec3::ZERO, ..good }).is_hit(), "{name}");
+    });
+}
+
+#[test]
+fn lanes_that_are_not_active_stay_misses() {
+    let accel = square();
+    let rays = RayPacket::<16>::of_slice(&[Ray::new(Vec3::new(0.5, 0.25, 1.0), -Vec3::Z); 16]);
+    let hits = accel.intersect_packet(&rays, 0b1010_0000_0000_0110);
+    for lane in 0..16 {
+        assert_eq!(hits.get(lane).is_hit(), [1, 2, 13, 15].contains(&lane));
+    }
+    assert_eq!(accel.occluded_packet(&rays, 0b101), 0b101);
+    assert_eq!(accel.occluded_packet(&rays, 0), 0);
+}
