@@ -22,8 +22,10 @@ impl KdTree {
     pub fn validate(&self) -> Result<(), String> {
         self.validate_shape()?;
         for primitive in 0..self.triangles.len() as u32 {
-            let polygon = Polygon::new(self.corners(primitive));
-            if !self.covers(primitive, self.root(), &self.bounds, polygon) {
+            let corners = self.corners(primitive);
+            let extended =
+                [0, 1, 2].map(|axis| corners.iter().any(|corner| corner[axis] != corners[0][axis]));
+            if !self.covers(primitive, extended, self.root(), &self.bounds, &Polygon::new(corners)) {
                 return Err(format!("triangle {primitive} is missing from a leaf that it overlaps"));
             }
         }
@@ -75,9 +77,10 @@ impl KdTree {
     }
 
     /// Whether the part of a triangle that lies in a node's cell is found in all of its leaves.
-    fn covers(&self, primitive: u32, node: Node, cell: &Aabb, piece: Polygon) -> bool {
+    /// `extended` says along which axes the whole triangle has an extent.
+    fn covers(&self, primitive: u32, extended: [bool; 3], node: Node, cell: &Aabb, piece: &Polygon) -> bool {
         if node.is_leaf() {
-            return self.primitives(node).contains(&primitive);
+            return self.primitives(node).contains(&primitive) || only_touches(piece, extended, cell);
         }
         let (axis, split) = (node.axis(), f64::from(node.split()));
         let (low, high) = piece.certain_range(axis);
@@ -86,7 +89,7 @@ impl KdTree {
         let go = |child: Node, cell: &Aabb, is_below: bool| {
             let mut part = piece.clone();
             part.clip(axis, node.split(), is_below);
-            part.is_empty() || self.covers(primitive, child, cell, part)
+            part.is_empty() || self.covers(primitive, extended, child, cell, &part)
         };
         match (low < split, high > split) {
             (true, true) => go(below, &cell_below, true) && go(above, &cell_above, false),
@@ -96,6 +99,16 @@ impl KdTree {
             (false, false) => go(below, &cell_below, true) || go(above, &cell_above, false),
         }
     }
+}
+
+/// Whether a piece of a triangle lies in a face of a cell, as far as can be said, while the
+/// triangle goes on beyond: then the neighbour has it, and nothing of it is inside. A triangle
+/// that is flat along the axis has no such excuse.
+fn only_touches(piece: &Polygon, extended: [bool; 3], cell: &Aabb) -> bool {
+    (0..3).any(|axis| {
+        let (low, high) = piece.certain_range(axis);
+        extended[axis] && (low >= f64::from(cell.max[axis]) || high <= f64::from(cell.min[axis]))
+    })
 }
 
 /// The cells of an inner node's children: below its plane, and above.

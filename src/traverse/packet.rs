@@ -11,7 +11,7 @@
 //! With `W = 1` and plain floats this is the single-ray kernel.
 
 use super::lanes::{HitPacket, RayPacket};
-use super::walk::{Heading, Interval, Walk};
+use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::NO_PRIMITIVE;
 use crate::geometry::triangle::{self, watertight::Shear};
 use crate::kdtree::{MAX_DEPTH, Node, Tree};
@@ -110,9 +110,7 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, const ANY: bool>(
     if live == 0 {
         return closest;
     }
-    let direction = [0, 1, 2].map(|axis| L::load(&rays.direction[axis]));
-    let origin = [0, 1, 2].map(|axis| L::load(&rays.origin[axis]));
-    let shear = Shear::<W, L>::new(&origin, &direction, live);
+    let shear = Shear::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
     let tnear = L::load(&rays.tnear);
 
     let mut node = tree.root();

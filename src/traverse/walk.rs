@@ -76,38 +76,45 @@ impl<const W: usize, L: Lanes<W>> Walk<W, L> {
     /// infinity in origin or direction, a zero direction) comes out empty.
     #[inline(always)]
     pub fn new(rays: &RayPacket<W>, active: u32, bounds: &Aabb) -> (Self, Interval<L>) {
-        let origin = [0, 1, 2].map(|axis| L::load(&rays.origin[axis]));
-        let direction = [0, 1, 2].map(|axis| L::load(&rays.direction[axis]));
-
-        // Lift direction components that are next to nothing.
-        let [x, y, z] = direction.map(Lanes::abs);
-        let longest = x.max(y).max(z);
+        let zero = L::splat(0.0);
+        let greatest = L::splat(f32::MAX);
+        let origin: [L; 3] = load3(&rays.origin);
+        let direction: [L; 3] = load3(&rays.direction);
+        let longest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
         let flattest = longest * L::splat(FLATTEST);
-        let inverse = direction.map(|d| L::splat(1.0) / flattest.max(d.abs()).copysign(d));
-        let down = inverse.map(|i| i.lt(L::splat(0.0)));
 
-        // The walls' thickness follows from how far the scene reaches from the origin.
-        let mut reach = L::splat(0.0);
+        let mut reach = zero;
+        let mut sound = zero.lt(longest) & L::mask_from_bits(active);
+        let mut inverse = [zero; 3];
         for axis in 0..3 {
+            // Lift direction components that are next to nothing.
+            let steep = flattest.max(direction[axis].abs()).copysign(direction[axis]);
+            inverse[axis] = L::splat(1.0) / steep;
+            // The walls' thickness follows from how far the scene reaches from the origin.
             let to_low = (L::splat(bounds.min[axis]) - origin[axis]).abs();
             let to_high = (L::splat(bounds.max[axis]) - origin[axis]).abs();
             reach = to_low.max(to_high).max(reach);
+            // A lane that is no ray has something in it that is not at most the greatest float.
+            sound = sound & origin[axis].abs().le(greatest) & direction[axis].abs().le(greatest);
         }
-        let margin = inverse.map(|i| (reach * L::splat(MARGIN)) * i.abs());
 
-        // A lane that is no ray. A NaN is not at most anything.
-        let zero = L::splat(0.0);
-        let greatest = L::splat(f32::MAX);
-        let finite = |[x, y, z]: &[L; 3]| x.abs().le(greatest) & y.abs().le(greatest) & z.abs().le(greatest);
-        let sound = finite(&origin) & finite(&direction) & zero.lt(longest) & L::mask_from_bits(active);
-
-        let bits = down.map(|d| d.bits() & active);
-        let heading = bits.map(|bits| match bits {
-            0 => Heading::Up,
-            all if all == active => Heading::Down,
-            _ => Heading::Mixed,
-        });
-        let mostly_down = bits.map(|bits| 2 * bits.count_ones() > active.count_ones());
+        // Who runs where.
+        let thickness = reach * L::splat(MARGIN);
+        let mut margin = [zero; 3];
+        let mut down = [sound; 3];
+        let mut heading = [Heading::Up; 3];
+        let mut mostly_down = [false; 3];
+        for axis in 0..3 {
+            margin[axis] = thickness * inverse[axis].abs();
+            down[axis] = inverse[axis].lt(zero);
+            let bits = down[axis].bits() & active;
+            heading[axis] = match bits {
+                0 => Heading::Up,
+                _ if bits == active => Heading::Down,
+                _ => Heading::Mixed,
+            };
+            mostly_down[axis] = 2 * bits.count_ones() > active.count_ones();
+        }
         let walk = Self { origin, inverse, margin, down, heading, mostly_down };
 
         // Clip to the bounds. `max` and `min` keep a NaN that stands on their right.
@@ -143,9 +150,22 @@ impl<const W: usize, L: Lanes<W>> Walk<W, L> {
     /// The same two parts sorted by place: below the plane, and above.
     #[inline(always)]
     pub fn by_place(&self, axis: usize, [first, second]: [Interval<L>; 2]) -> [Interval<L>; 2] {
-        let swap = |a: L, b: L| (L::select(self.down[axis], b, a), L::select(self.down[axis], a, b));
-        let (below_min, above_min) = swap(first.tmin, second.tmin);
-        let (below_max, above_max) = swap(first.tmax, second.tmax);
-        [Interval { tmin: below_min, tmax: below_max }, Interval { tmin: above_min, tmax: above_max }]
+        let down = self.down[axis];
+        [
+            Interval {
+                tmin: L::select(down, second.tmin, first.tmin),
+                tmax: L::select(down, second.tmax, first.tmax),
+            },
+            Interval {
+                tmin: L::select(down, first.tmin, second.tmin),
+                tmax: L::select(down, first.tmax, second.tmax),
+            },
+        ]
     }
+}
+
+/// Three components of `W` lanes.
+#[inline(always)]
+pub fn load3<const W: usize, L: Lanes<W>>(components: &[[f32; W]; 3]) -> [L; 3] {
+    [L::load(&components[0]), L::load(&components[1]), L::load(&components[2])]
 }

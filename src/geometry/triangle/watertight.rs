@@ -16,11 +16,8 @@
 use super::Corners;
 use crate::simd::{Lanes, Mask};
 
-/// The axis that follows `axis`, cyclically.
-#[inline(always)]
-const fn next(axis: usize) -> usize {
-    if axis == 2 { 0 } else { axis + 1 }
-}
+/// Which coordinates become x, y and z when an axis becomes z: a cyclic renaming.
+const RENAMED: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 /// Three coordinates, `W` lanes each.
 pub type Lanes3<L> = [L; 3];
@@ -58,7 +55,7 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// A lane whose direction is zero or not finite gets a shear of NaNs, and so never a hit.
     #[inline(always)]
     pub fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {
-        let [x, y, z] = direction.map(Lanes::abs);
+        let (x, y, z) = (direction[0].abs(), direction[1].abs(), direction[2].abs());
         // Ties go to the earlier axis, so that every width picks alike.
         let major_x = y.le(x) & z.le(x);
         let major_y = !major_x & z.le(y);
@@ -83,9 +80,26 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// Coordinates renamed lane by lane so that each lane's greatest axis comes last.
     #[inline(always)]
     fn renamed(&self, [x, y, z]: &Lanes3<L>) -> Lanes3<L> {
-        let pick =
-            |if_x: L, if_y: L, if_z: L| L::select(self.major_x, if_x, L::select(self.major_y, if_y, if_z));
-        [pick(*y, *z, *x), pick(*z, *x, *y), pick(*x, *y, *z)]
+        [self.pick(*y, *z, *x), self.pick(*z, *x, *y), self.pick(*x, *y, *z)]
+    }
+
+    /// The value that belongs to each lane's greatest axis.
+    #[inline(always)]
+    fn pick(&self, if_x: L, if_y: L, if_z: L) -> L {
+        L::select(self.major_x, if_x, L::select(self.major_y, if_y, if_z))
+    }
+
+    /// A corner relative to the origins, with its coordinates renamed.
+    #[inline(always)]
+    fn translated(&self, corner: &[f32; 3]) -> Lanes3<L> {
+        let [x, y, z] = match self.major {
+            Some(axis) => {
+                let [i, j, k] = RENAMED[axis];
+                [L::splat(corner[i]), L::splat(corner[j]), L::splat(corner[k])]
+            }
+            None => self.renamed(&[L::splat(corner[0]), L::splat(corner[1]), L::splat(corner[2])]),
+        };
+        [x - self.origin[0], y - self.origin[1], z - self.origin[2]]
     }
 
     /// One triangle against all lanes. Edges and corners belong to the triangle; a triangle seen
@@ -93,20 +107,15 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     #[inline(always)]
     pub fn test(&self, corners: &Corners) -> Candidate<W, L> {
         // Translate the corners to the origins, with their coordinates renamed.
-        let translated = match self.major {
-            Some(axis) => {
-                let order = [next(axis), next(next(axis)), axis];
-                corners.map(|corner| std::array::from_fn(|i| L::splat(corner[order[i]]) - self.origin[i]))
-            }
-            None => corners.map(|corner| {
-                let renamed = self.renamed(&corner.map(L::splat));
-                std::array::from_fn::<L, 3, _>(|i| renamed[i] - self.origin[i])
-            }),
-        };
+        let [ax, ay, az] = self.translated(&corners[0]);
+        let [bx, by, bz] = self.translated(&corners[1]);
+        let [cx, cy, cz] = self.translated(&corners[2]);
 
         // Shear x and y so that the rays run along z.
-        let [[ax, ay], [bx, by], [cx, cy]] =
-            translated.map(|[x, y, z]| [x - self.shear[0] * z, y - self.shear[1] * z]);
+        let [sx, sy, sz] = self.shear;
+        let (ax, ay) = (ax - sx * az, ay - sy * az);
+        let (bx, by) = (bx - sx * bz, by - sy * bz);
+        let (cx, cy) = (cx - sx * cz, cy - sy * cz);
 
         // Edge functions: each is opposite to the corner whose weight it is.
         let mut a = cx * by - cy * bx;
@@ -123,9 +132,9 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         // Where an edge function is zero, its sign is not known: ask double precision.
         let unsure = (a.eq(zero) | b.eq(zero) | c.eq(zero)) & inside;
         if unsure.any() {
-            let sheared = [ax, ay, bx, by, cx, cy].map(Lanes::store);
-            [a, b, c] =
-                edges_in_double(unsure.bits(), &sheared, [a, b, c].map(Lanes::store)).map(|e| L::load(&e));
+            let sheared = [ax.store(), ay.store(), bx.store(), by.store(), cx.store(), cy.store()];
+            let edges = edges_in_double(unsure.bits(), &sheared, [a.store(), b.store(), c.store()]);
+            (a, b, c) = (L::load(&edges[0]), L::load(&edges[1]), L::load(&edges[2]));
             inside = inside & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
         }
 
@@ -134,9 +143,8 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         inside = inside & (sum.lt(zero) | zero.lt(sum));
 
         // Distance: the corners' depths, weighted.
-        let [az, bz, cz] = translated.map(|[_, _, z]| self.shear[2] * z);
         let inverse = L::splat(1.0) / sum;
-        let t = (a * az + b * bz + c * cz) * inverse;
+        let t = (a * (sz * az) + b * (sz * bz) + c * (sz * cz)) * inverse;
         Candidate { inside, t, u: b * inverse, v: c * inverse }
     }
 }
