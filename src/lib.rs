@@ -1,7 +1,61 @@
-//! raypack: a packet-traversal ray engine for the CPU.
+//! raypack is a packet-traversal ray engine for the CPU: an SAH kd-tree of 8-byte nodes, SIMD ray
+//! packets that walk it, and a scheduler that renders frames tile by tile.
+//!
+//! ```
+//! use raypack::Vec3;
+//! use raypack::geometry::Ray;
+//! use raypack::kdtree::BuildParams;
+//! use raypack::mesh::Mesh;
+//! use raypack::traverse::{Accel, RayPacket};
+//!
+//! // A mesh: positions, and three indices for each triangle. `raypack::mesh::read` makes one
+//! // from a file.
+//! let mesh = Mesh {
+//!     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.0, 0.0, -1.0)],
+//!     triangles: vec![[0, 1, 2], [3, 1, 2]],
+//!     ..Mesh::default()
+//! };
+//!
+//! // Made ready for tracing, with the best instruction set that this machine has.
+//! let accel = Accel::build(&mesh, &BuildParams::default())?;
+//!
+//! // One ray: the closest hit, and whether there is any.
+//! let ray = Ray::new(Vec3::new(0.25, 0.25, 2.0), Vec3::new(0.0, 0.0, -1.0));
+//! let hit = accel.intersect(&ray);
+//! assert_eq!((hit.primitive, hit.t, hit.u, hit.v), (0, 2.0, 0.25, 0.25));
+//! assert_eq!(ray.at(hit.t), Vec3::new(0.25, 0.25, 0.0));
+//! assert!(!accel.occluded(&Ray { tfar: 1.0, ..ray }));
+//!
+//! // Sixteen rays in SIMD lanes: the same hits, several times faster when they go the same way.
+//! let packet = RayPacket::<16>::of_slice(&[ray; 16]);
+//! let hits = accel.intersect_packet(&packet, 0xffff);
+//! assert_eq!(hits.get(7), hit);
+//! # Ok::<(), raypack::Error>(())
+//! ```
+//!
+//! # Where things are
+//!
+//! | room | what is in it |
+//! |---|---|
+//! | [`simd`] | vectors of 4, 8 and 16 floats, and the choice of an instruction set at run time |
+//! | [`geometry`] | ray, hit, box, the ray-triangle tests, clipping |
+//! | [`mesh`] | triangle meshes, readers of model files, generators |
+//! | [`kdtree`] | the tree: builder, statistics, validation |
+//! | [`traverse`] | the kernels that take rays through a tree |
+//! | [`scene`] | camera, camera paths, lights |
+//! | [`render`] | tiles, their scheduler, shading, pictures |
+//! | [`profile`] | every tunable in one file |
+//! | [`study`] | measurements: rays per second beside other engines |
+//! | `cli` | the `raypack` command (feature `cli`) |
+//!
+//! A room uses only those above it.
+//!
+//! # Conventions
+//!
+//! Coordinates are right-handed `f32`, and Y is up where up matters. Intervals of a ray's
+//! parameter are closed. Of several hits at the same distance the lowest primitive id wins.
+//! Every kernel on every instruction set gives the same answer, to the bit.
 
-#[cfg(feature = "cli")]
-pub mod cli;
 pub mod error;
 pub mod geometry;
 pub mod kdtree;
@@ -12,6 +66,9 @@ pub mod scene;
 pub mod simd;
 pub mod study;
 pub mod traverse;
+
+#[cfg(feature = "cli")]
+pub mod cli;
 
 pub use error::{Error, Result};
 pub use glam::Vec3;
