@@ -1,10 +1,26 @@
 //! Triangle meshes: what readers and generators make and the tree builder takes.
+//!
+//! [`read()`] turns an OBJ or PLY file into a checked [`Mesh`] and says what it dropped or
+//! repaired; [`generate`] makes models of any size; [`ply::write`] saves one.
+
+mod check;
+mod color;
+pub mod generate;
+pub mod obj;
+pub mod ply;
+mod read;
+
+pub use check::MAX_TRIANGLES;
+pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
+pub use read::{Loaded, ReadReport, read, read_with_progress};
 
 use crate::geometry::Aabb;
 use glam::Vec3;
 
 /// Triangles with shared vertices and a colour for each triangle.
-#[derive(Clone, Debug, Default)]
+///
+/// A triangle's place in `triangles` is its primitive id, which a hit names.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions, all finite.
     pub positions: Vec<Vec3>,
@@ -12,39 +28,6 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// What colour the triangles have.
     pub colors: Colors,
-}
-
-/// Where a triangle's colour comes from. Colours are linear RGB reflectances, 0 to 1.
-#[derive(Clone, Debug)]
-pub enum Colors {
-    /// One colour for everything.
-    Uniform(Vec3),
-    /// One sRGB-encoded colour a triangle.
-    PerTriangle(Vec<[u8; 3]>),
-    /// One sRGB-encoded colour a vertex, interpolated in linear light.
-    PerVertex(Vec<[u8; 3]>),
-    /// Named materials, and for each triangle an index into them.
-    PerMaterial {
-        /// The materials.
-        materials: Vec<Material>,
-        /// One index a triangle.
-        of_triangle: Vec<u32>,
-    },
-}
-
-impl Default for Colors {
-    fn default() -> Self {
-        Self::Uniform(Vec3::splat(0.7))
-    }
-}
-
-/// A surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// Its name in the file.
-    pub name: String,
-    /// Diffuse reflectance, linear RGB.
-    pub diffuse: Vec3,
 }
 
 impl Mesh {
@@ -57,5 +40,76 @@ impl Mesh {
     /// The box around all triangles (vertices that no triangle uses do not count).
     pub fn bounds(&self) -> Aabb {
         Aabb::of_points(self.triangles.iter().flatten().map(|&i| self.positions[i as usize]))
+    }
+
+    /// The surface's linear RGB reflectance where a hit's barycentrics are `u` and `v`.
+    ///
+    /// Vertex colours blend in linear light as `(1 - u - v) c0 + u c1 + v c2`. Panics if
+    /// `primitive` is out of range.
+    #[inline]
+    pub fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
+        let i = primitive as usize;
+        match &self.colors {
+            Colors::Uniform(color) => *color,
+            Colors::PerTriangle(colors) => color::decode(colors[i]),
+            Colors::PerVertex(colors) => {
+                let [c0, c1, c2] = self.triangles[i].map(|k| color::decode(colors[k as usize]));
+                (1.0 - u - v) * c0 + u * c1 + v * c2
+            }
+            Colors::PerMaterial { materials, of_triangle } => materials[of_triangle[i] as usize].diffuse,
+        }
+    }
+
+    /// Bytes of memory that the mesh's arrays take up.
+    pub fn bytes(&self) -> usize {
+        self.positions.capacity() * size_of::<Vec3>()
+            + self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.colors.bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(colors: Colors) -> Mesh {
+        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], colors }
+    }
+
+    #[test]
+    fn vertex_colors_blend_in_linear_light() {
+        let mesh = triangle(Colors::PerVertex(vec![[255, 0, 0], [0, 255, 0], [0, 0, 255]]));
+        assert_eq!(mesh.color(0, 0.0, 0.0), Vec3::X);
+        assert_eq!(mesh.color(0, 1.0, 0.0), Vec3::Y);
+        assert_eq!(mesh.color(0, 0.25, 0.5), Vec3::new(0.25, 0.25, 0.5));
+    }
+
+    #[test]
+    fn eight_bit_colors_are_srgb() {
+        let mesh = triangle(Colors::PerTriangle(vec![[188, 255, 0]]));
+        let c = mesh.color(0, 0.3, 0.3);
+        assert!((c.x - 0.5).abs() < 0.005, "sRGB 188 is half the light, not {}", c.x);
+        assert_eq!((c.y, c.z), (1.0, 0.0));
+    }
+
+    #[test]
+    fn materials_are_looked_up_by_triangle() {
+        let red = Material { name: "red".into(), diffuse: Vec3::X };
+        let blue = Material { name: "blue".into(), diffuse: Vec3::Z };
+        let mesh = triangle(Colors::PerMaterial { materials: vec![red, blue.clone()], of_triangle: vec![1] });
+        assert_eq!(mesh.color(0, 0.1, 0.2), blue.diffuse);
+    }
+
+    #[test]
+    fn bytes_count_every_array() {
+        let mesh = triangle(Colors::PerTriangle(vec![[1, 2, 3]]));
+        assert_eq!(mesh.bytes(), 3 * 12 + 12 + 3);
+    }
+
+    #[test]
+    fn bounds_leave_out_unused_vertices() {
+        let mut mesh = triangle(Colors::default());
+        mesh.positions.push(Vec3::splat(100.0));
+        assert_eq!(mesh.bounds().max, Vec3::new(1.0, 1.0, 0.0));
     }
 }

@@ -1,0 +1,121 @@
+//! Surface colours, and the sRGB transfer function between bytes and light.
+
+use glam::Vec3;
+use std::sync::LazyLock;
+
+/// Where a triangle's colour comes from. Colours are linear RGB reflectances, 0 to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Colors {
+    /// One colour for everything.
+    Uniform(Vec3),
+    /// One sRGB-encoded colour a triangle.
+    PerTriangle(Vec<[u8; 3]>),
+    /// One sRGB-encoded colour a vertex, interpolated in linear light.
+    PerVertex(Vec<[u8; 3]>),
+    /// Named materials, and for each triangle an index into them.
+    PerMaterial {
+        /// The materials.
+        materials: Vec<Material>,
+        /// One index a triangle.
+        of_triangle: Vec<u32>,
+    },
+}
+
+/// A surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Its name in the file.
+    pub name: String,
+    /// Diffuse reflectance, linear RGB.
+    pub diffuse: Vec3,
+}
+
+/// The reflectance of what no file gives a colour.
+pub(super) const DEFAULT: Vec3 = Vec3::splat(0.7);
+
+impl Default for Colors {
+    fn default() -> Self {
+        Self::Uniform(DEFAULT)
+    }
+}
+
+impl Colors {
+    /// Bytes of memory that the colours take up.
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Self::Uniform(_) => 0,
+            Self::PerTriangle(colors) | Self::PerVertex(colors) => colors.capacity() * 3,
+            Self::PerMaterial { materials, of_triangle } => {
+                let names: usize = materials.iter().map(|m| m.name.capacity()).sum();
+                of_triangle.capacity() * 4 + materials.capacity() * size_of::<Material>() + names
+            }
+        }
+    }
+}
+
+/// The light, 0 to 1, that an sRGB-encoded byte stands for.
+#[inline]
+pub fn srgb_to_linear(byte: u8) -> f32 {
+    static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|i| {
+            let s = i as f64 / 255.0;
+            let light = if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) };
+            light as f32
+        })
+    });
+    LINEAR[byte as usize]
+}
+
+/// The nearest sRGB-encoded byte to an amount of light; what lies outside 0 to 1 is clamped, and
+/// NaN is 0.
+#[inline]
+pub fn linear_to_srgb(light: f32) -> u8 {
+    let s = if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    // The cast saturates, and takes NaN to 0.
+    (s * 255.0 + 0.5) as u8
+}
+
+/// An sRGB triple in linear light.
+#[inline]
+pub(super) fn decode(srgb: [u8; 3]) -> Vec3 {
+    Vec3::from_array(srgb.map(srgb_to_linear))
+}
+
+/// Linear light as an sRGB triple.
+pub(super) fn encode(linear: Vec3) -> [u8; 3] {
+    linear.to_array().map(linear_to_srgb)
+}
+
+/// sRGB-encoded floats as bytes. They run from 0 to 1, but some tools write 0 to 255 all the
+/// same: so one value above 1 says that all of them are meant so.
+pub(super) fn quantize(colors: &[[f32; 3]]) -> Vec<[u8; 3]> {
+    let scale = if colors.iter().flatten().any(|&c| c > 1.0) { 1.0 } else { 255.0 };
+    colors.iter().map(|c| c.map(|c| (c * scale + 0.5) as u8)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_survives_the_round_trip() {
+        for byte in 0..=255 {
+            assert_eq!(linear_to_srgb(srgb_to_linear(byte)), byte);
+        }
+    }
+
+    #[test]
+    fn light_outside_the_range_is_clamped() {
+        assert_eq!(
+            [-1.0, 0.0, 1.0, 7.0, f32::INFINITY, f32::NAN].map(linear_to_srgb),
+            [0, 0, 255, 255, 255, 0]
+        );
+    }
+
+    #[test]
+    fn float_colors_may_run_to_one_or_to_255() {
+        assert_eq!(quantize(&[[0.0, 0.5, 1.0]]), [[0, 128, 255]]);
+        assert_eq!(quantize(&[[0.0, 1.0, 255.0]]), [[0, 1, 255]]);
+        assert_eq!(quantize(&[[f32::NAN, -1.0, 300.0]]), [[0, 0, 255]]);
+    }
+}

@@ -1,0 +1,112 @@
+//! Stanford PLY: ASCII and both binary byte orders, read and written.
+//!
+//! The reader is our own. `ply-rs-bw` 4.0.1, the best-kept crate, was tried first. It is as fast
+//! (the power plant's 3.9 M faces: 0.6 s for either, from a mapped file), but it refuses what real
+//! files have: ASCII numbers such as `1.`, `.5` and `nan`, a Latin-1 letter in a comment, lines that
+//! end in CR; and it cannot say which item of an element is wrong. It is the judge in the tests.
+//!
+//! What is understood: elements `vertex`, `face` and `tristrips`, in any order; `x y z` of any
+//! numeric type; index lists named `vertex_indices` or `vertex_index` of any integer type; colours
+//! `red green blue` or `diffuse_red …` on vertices, faces or strips. A colour per face goes before
+//! one per vertex. Everything else is skipped. Faces of more than three corners become fans around
+//! their first corner (right for convex ones); every second triangle of a strip is turned round.
+
+mod body;
+mod elements;
+mod header;
+mod write;
+
+pub use write::write;
+
+use super::color;
+use super::{Colors, Mesh, ReadReport};
+use body::{Ascii, Binary, Source};
+use elements::{Faces, Shades, Vertices};
+use header::{Element, Encoding, Header};
+use std::path::Path;
+
+/// How many items pass between two reports of progress.
+const ITEMS_PER_REPORT: u64 = 1 << 17;
+
+/// Parses a PLY file's bytes.
+pub(super) fn parse(
+    bytes: &[u8],
+    _path: &Path,
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+) -> Result<Mesh, String> {
+    let header = Header::parse(bytes)?;
+    let body = &bytes[header.size..];
+    match header.encoding {
+        Encoding::Ascii => read_body(Ascii::new(body, header.lines), &header, report, progress),
+        Encoding::LittleEndian => read_body(Binary::<false>::new(body), &header, report, progress),
+        Encoding::BigEndian => read_body(Binary::<true>::new(body), &header, report, progress),
+    }
+}
+
+fn read_body<S: Source>(
+    mut source: S,
+    header: &Header,
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+) -> Result<Mesh, String> {
+    let size = source.remaining().max(1) as f32;
+    let vertex_count = header.vertex_count()?;
+    let mut vertices = Vertices::default();
+    let mut faces = Faces::new(vertex_count);
+    for element in &header.elements {
+        check_room(element, &source)?;
+        let mut row = |index: u64, source: &S| {
+            if index.is_multiple_of(ITEMS_PER_REPORT) {
+                progress(1.0 - source.remaining() as f32 / size);
+            }
+        };
+        let result = match element.name.as_str() {
+            "vertex" => vertices.read(element, &mut source, &mut row),
+            "face" => faces.read(element, &mut source, false, &mut row),
+            "tristrips" => faces.read(element, &mut source, true, &mut row),
+            _ => elements::skip(element, &mut source, &mut row),
+        };
+        result.map_err(|(index, message)| {
+            format!("{} {index} of {}{}: {message}", element.name, element.count, source.place())
+        })?;
+    }
+    report.trailing_bytes = source.trailing();
+    report.polygons = faces.polygons;
+    report.short_faces = faces.short;
+    report.strips = faces.strips;
+    let colors = match (faces.shades.finish(), vertices.shades.finish()) {
+        (Some(of_faces), _) => Colors::PerTriangle(of_faces),
+        (None, Some(of_vertices)) => Colors::PerVertex(of_vertices),
+        (None, None) => Colors::default(),
+    };
+    Ok(Mesh { positions: vertices.positions, triangles: faces.triangles, colors })
+}
+
+/// Refuses an element that cannot fit into what is left of the file, before anything is allocated
+/// for it.
+fn check_room<S: Source>(element: &Element, source: &S) -> Result<(), String> {
+    let least: u64 = element.properties.iter().map(|p| source.least_size(p)).sum();
+    let needed = element.count.saturating_mul(least);
+    // The last number of an ASCII file needs no line end after it.
+    if needed > source.remaining() as u64 + 1 {
+        return Err(format!(
+            "truncated: the header announces {} of element {}, at least {needed} bytes, but {} are left",
+            element.count,
+            element.name,
+            source.remaining()
+        ));
+    }
+    Ok(())
+}
+
+impl Shades {
+    /// The colours as bytes; nothing if no element had any.
+    fn finish(self) -> Option<Vec<[u8; 3]>> {
+        match self {
+            Self::None => None,
+            Self::Bytes(colors) => Some(colors),
+            Self::Floats(colors) => Some(color::quantize(&colors)),
+        }
+    }
+}

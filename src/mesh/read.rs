@@ -1,0 +1,196 @@
+//! Reading a model file, whatever its format, and saying what was found wrong with it.
+
+use super::check::{self, MAX_TRIANGLES, Unusable};
+use super::{Mesh, obj, ply};
+use crate::error::{Error, Result};
+use memmap2::Mmap;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::path::Path;
+
+/// A model as it came out of its file.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// What was kept, dropped and repaired on the way.
+    pub report: ReadReport,
+}
+
+/// What a reader kept, and what it dropped or repaired.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ReadReport {
+    /// Triangles in the mesh.
+    pub triangles: u64,
+    /// Vertices in the mesh.
+    pub vertices: u64,
+    /// Dropped: triangles that name one vertex twice.
+    pub degenerate_triangles: u64,
+    /// Kept: triangles of three different vertices whose positions lie on one line.
+    pub zero_area_triangles: u64,
+    /// Dropped: vertices that no triangle uses.
+    pub unused_vertices: u64,
+    /// How many of the unused vertices were NaN or infinite.
+    pub unused_non_finite: u64,
+    /// Faces of more than three corners, which became fans of triangles.
+    pub polygons: u64,
+    /// Triangle strips that were unrolled.
+    pub strips: u64,
+    /// Dropped: faces of fewer than three corners.
+    pub short_faces: u64,
+    /// Dropped: lines (OBJ `l`).
+    pub lines: u64,
+    /// Dropped: points (OBJ `p`).
+    pub points: u64,
+    /// Vertices that got the default colour because only others had one.
+    pub uncolored_vertices: u64,
+    /// MTL files that could not be read.
+    pub missing_material_files: Vec<String>,
+    /// Materials that are used but nowhere defined; they got the default colour.
+    pub unknown_materials: Vec<String>,
+    /// MTL lines that made no sense and were left out.
+    pub bad_material_lines: u64,
+    /// Bytes after the last element that the header announces.
+    pub trailing_bytes: u64,
+}
+
+impl ReadReport {
+    /// What was dropped or repaired, in one line; empty if nothing was.
+    pub fn summary(&self) -> String {
+        let counted = [
+            (self.polygons, "polygon", "split into triangles"),
+            (self.strips, "triangle strip", "unrolled"),
+            (self.degenerate_triangles, "triangle", "with a repeated vertex dropped"),
+            (self.zero_area_triangles, "triangle", "without area kept"),
+            (self.short_faces, "face", "of fewer than three corners dropped"),
+            (self.lines, "line", "ignored"),
+            (self.points, "point", "ignored"),
+            (self.unused_vertices, "unused vertex", "dropped"),
+            (self.unused_non_finite, "unused vertex", "NaN or infinite"),
+            (self.uncolored_vertices, "vertex", "without a colour made grey"),
+            (self.bad_material_lines, "MTL line", "not understood"),
+            (self.trailing_bytes, "byte", "after the end of the data ignored"),
+        ];
+        let mut parts: Vec<String> = counted
+            .iter()
+            .filter(|(count, ..)| *count > 0)
+            .map(|(count, noun, what)| format!("{count} {} {what}", plural(noun, *count)))
+            .collect();
+        let named = [
+            ("material file", "not found", &self.missing_material_files),
+            ("material", "not defined", &self.unknown_materials),
+        ];
+        for (noun, what, names) in named.iter().filter(|(.., names)| !names.is_empty()) {
+            let mut part = format!("{} {what}: ", plural(noun, names.len() as u64));
+            part.push_str(&names.iter().take(3).cloned().collect::<Vec<_>>().join(", "));
+            if names.len() > 3 {
+                let _ = write!(part, " and {} more", names.len() - 3);
+            }
+            parts.push(part);
+        }
+        parts.join("; ")
+    }
+}
+
+/// `noun` as `count` demands it.
+fn plural(noun: &str, count: u64) -> String {
+    match noun.strip_suffix("ex") {
+        _ if count == 1 => noun.into(),
+        Some(stem) => format!("{stem}ices"),
+        None => format!("{noun}s"),
+    }
+}
+
+/// Reads a model. The file's ending decides how: `.obj` (with its MTL files) or `.ply`.
+///
+/// # Errors
+///
+/// The file cannot be read, is of another kind, is malformed or truncated, names vertices that
+/// do not exist, has no triangles or too many, or has triangles with NaN or infinite corners.
+/// Each message is one line that names the file and, where it can be known, the place.
+pub fn read(path: impl AsRef<Path>) -> Result<Loaded> {
+    read_with_progress(path, &|_| {})
+}
+
+/// The same; `progress` is told now and then what part of the file (0 to 1) is behind.
+pub fn read_with_progress(path: impl AsRef<Path>, progress: &dyn Fn(f32)) -> Result<Loaded> {
+    let path = path.as_ref();
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let parse = match ending.as_deref() {
+        Some("obj") => obj::parse,
+        Some("ply") => ply::parse,
+        _ => {
+            return Err(Error::UnknownFormat {
+                path: path.into(),
+                expected: "a model is a .obj or a .ply file",
+            });
+        }
+    };
+    let bytes = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
+    let malformed = |message: String| Error::malformed(path, message);
+    let mut report = ReadReport::default();
+    let raw = parse(&bytes, path, &mut report, progress).map_err(malformed)?;
+    let (vertices, faces) = (raw.positions.len(), raw.triangles.len());
+    let mesh = check::check(raw, &mut report).map_err(|unusable| {
+        malformed(match unusable {
+            Unusable::NoTriangles if faces == 0 => {
+                format!("no triangles ({vertices} vertices); a model needs faces, not points or lines alone")
+            }
+            Unusable::NoTriangles => {
+                format!("no triangles: all {faces} name a vertex twice")
+            }
+            Unusable::TooManyTriangles(n) => {
+                format!("{n} triangles, at most {MAX_TRIANGLES} are possible; split the model")
+            }
+            Unusable::NonFinite(bad) => format!(
+                "{} {} that triangles use {} NaN or infinite, the first is vertex {} (counted from 0); repair the model",
+                bad.count,
+                plural("vertex", bad.count),
+                if bad.count == 1 { "is" } else { "are" },
+                bad.first,
+            ),
+        })
+    })?;
+    progress(1.0);
+    Ok(Loaded { mesh, report })
+}
+
+/// The file's bytes, mapped.
+fn map(path: &Path) -> std::io::Result<Mmap> {
+    let file = File::open(path)?;
+    if file.metadata()?.is_dir() {
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
+    // SAFETY: the map is read-only and dropped before `read` returns; nothing of it is kept. The one
+    // thing that a map cannot promise is that no other process writes to the file meanwhile. Every
+    // value is checked after it was taken, so changed bytes give an error or another model; a file
+    // that is cut short meanwhile ends the process (SIGBUS), as in every program that maps files.
+    unsafe { Mmap::map(&file) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_to_say_about_a_sound_file() {
+        let report = ReadReport { triangles: 7, vertices: 9, ..Default::default() };
+        assert_eq!(report.summary(), "");
+    }
+
+    #[test]
+    fn the_summary_is_one_line_with_counts_and_names() {
+        let report = ReadReport {
+            polygons: 1,
+            unused_vertices: 2,
+            unknown_materials: ["a", "b", "c", "d", "e"].map(String::from).to_vec(),
+            ..Default::default()
+        };
+        assert_eq!(
+            report.summary(),
+            "1 polygon split into triangles; 2 unused vertices dropped; \
+             materials not defined: a, b, c and 2 more"
+        );
+    }
+}
