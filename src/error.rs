@@ -80,4 +80,17 @@ impl Error {
     pub fn malformed(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
         Self::Malformed { path: path.into(), message: message.into() }
     }
+
+    /// An [`Error::Malformed`] of what the TOML parser found wrong with a file's text: its first
+    /// line, with the number of the line at fault.
+    pub fn toml(path: impl Into<PathBuf>, text: &str, error: &toml::de::Error) -> Self {
+        let said = error.message().lines().next().unwrap_or_default();
+        match error.span() {
+            Some(span) if span.end > 0 => {
+                let line = 1 + text.bytes().take(span.start).filter(|&b| b == b'\n').count();
+                Self::malformed(path, format!("line {line}: {said}"))
+            }
+            _ => Self::malformed(path, said),
+        }
+    }
 }

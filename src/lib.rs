@@ -57,6 +57,7 @@
 //! Every kernel on every instruction set gives the same answer, to the bit.
 
 pub mod error;
+pub mod files;
 pub mod geometry;
 pub mod kdtree;
 pub mod mesh;
