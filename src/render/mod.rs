@@ -1,1 +1,26 @@
-//! STUB
+//! From rays to pictures.
+//!
+//! A [`Renderer`] cuts a picture into tiles along a Hilbert curve, hands them to workers that
+//! steal from one another, and shades what the packets of each tile hit. At no time is there
+//! more than a handful of packets per worker. **The picture is the same, bit for bit, for every
+//! number of threads, tile size, packet width and instruction set.**
+
+mod frame;
+pub mod image;
+mod offset;
+mod order;
+mod renderer;
+mod sampling;
+mod scheduler;
+mod settings;
+mod shade;
+mod stats;
+mod tile;
+
+pub use frame::Frame;
+pub use offset::offset_point;
+pub use order::{Tile, tiles};
+pub use renderer::Renderer;
+pub use scheduler::{Outcome, Workers};
+pub use settings::{Aovs, RenderSettings, Size, Tuning};
+pub use stats::{FrameStats, RayCount};

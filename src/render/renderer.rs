@@ -1,0 +1,113 @@
+//! Cameras to frames.
+
+use super::frame::{Frame, TilePixels, TiledFrame};
+use super::order::{Tile, tiles};
+use super::scheduler::{Outcome, Workers};
+use super::settings::RenderSettings;
+use super::shade::Shader;
+use super::stats::{FrameStats, RayCount, Tally};
+use super::tile::{Scratch, TileTask};
+use crate::error::Result;
+use crate::mesh::Mesh;
+use crate::scene::{Camera, Lighting};
+use crate::traverse::{Accel, Kernel, PacketWidth, RayPacket};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Makes pictures of one scene with one set of settings.
+#[derive(Debug)]
+pub struct Renderer<'a> {
+    accel: &'a Accel,
+    mesh: &'a Mesh,
+    settings: RenderSettings,
+    tiles: Vec<Tile>,
+}
+
+impl<'a> Renderer<'a> {
+    /// A renderer; `accel` must have been built from `mesh`.
+    ///
+    /// # Errors
+    /// As [`RenderSettings::check`].
+    pub fn new(accel: &'a Accel, mesh: &'a Mesh, settings: RenderSettings) -> Result<Self> {
+        settings.check()?;
+        let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
+        Ok(Self { accel, mesh, settings, tiles })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// How many tiles a frame has.
+    pub fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Renders a frame.
+    pub fn frame(&self, camera: &Camera, lighting: &Lighting) -> (Frame, FrameStats) {
+        self.frame_with_progress(camera, lighting, &AtomicUsize::new(0))
+    }
+
+    /// Renders a frame; `tiles_done` is raised by one with each tile and can be read meanwhile.
+    pub fn frame_with_progress(
+        &self,
+        camera: &Camera,
+        lighting: &Lighting,
+        tiles_done: &AtomicUsize,
+    ) -> (Frame, FrameStats) {
+        match self.settings.tuning.packet {
+            Kernel::Single => self.frame_of::<1>(camera, lighting, tiles_done),
+            Kernel::Packet4 => self.frame_of::<4>(camera, lighting, tiles_done),
+            Kernel::Packet8 => self.frame_of::<8>(camera, lighting, tiles_done),
+            Kernel::Packet16 => self.frame_of::<16>(camera, lighting, tiles_done),
+        }
+    }
+
+    fn frame_of<const W: usize>(
+        &self,
+        camera: &Camera,
+        lighting: &Lighting,
+        tiles_done: &AtomicUsize,
+    ) -> (Frame, FrameStats)
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        let start = Instant::now();
+        let RenderSettings { size, samples, shadows, aovs, ref tuning } = self.settings;
+        let workers = Workers { threads: tuning.worker_count(), pin: tuning.pin };
+        let task = TileTask {
+            accel: self.accel,
+            shader: Shader::new(self.mesh, lighting, shadows),
+            view: camera.view(size.width, size.height),
+            samples,
+        };
+
+        let mut tiled = TiledFrame::new(size, aovs);
+        let outcome = workers.run(
+            tiled.split(&self.tiles),
+            Scratch::<W>::new,
+            |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
+                task.render(scratch, pixels);
+                tiles_done.fetch_add(1, Ordering::Relaxed);
+            },
+        );
+        let frame = tiled.assemble(size, &self.tiles);
+        (frame, self.stats(&outcome, start.elapsed().as_secs_f64()))
+    }
+
+    fn stats<const W: usize>(&self, outcome: &Outcome<Scratch<W>>, seconds: f64) -> FrameStats {
+        let threads = outcome.states.len();
+        let camera: Tally = outcome.states.iter().map(|scratch| scratch.camera).sum();
+        let shadow: Tally = outcome.states.iter().map(|scratch| scratch.shadow).sum();
+        FrameStats {
+            camera: RayCount::new(camera, threads),
+            shadow: RayCount::new(shadow, threads),
+            total: RayCount::of(camera.rays + shadow.rays, seconds),
+            seconds,
+            tiles: self.tiles.len(),
+            threads,
+            pinned: outcome.pinned,
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! What a ray from the eye sees: a Lambertian surface in key and ambient light, or the sky.
+
+use super::offset::offset_point;
+use crate::geometry::{Hit, Ray};
+use crate::mesh::Mesh;
+use crate::scene::Lighting;
+use glam::{DVec3, Vec3};
+
+/// Shades hits. The arithmetic is plain `f32` lane by lane: the same for every packet width and
+/// instruction set.
+pub(super) struct Shader<'a> {
+    mesh: &'a Mesh,
+    lighting: Lighting,
+    shadows: bool,
+}
+
+/// What one sample sees.
+pub(super) struct Shade {
+    /// Light that arrives in any case.
+    pub base: Vec3,
+    /// Light that is added if the shadow ray is free.
+    pub key: Vec3,
+    /// The ray to the key light; `None` if nothing depends on it.
+    pub shadow: Option<Ray>,
+    /// Distance from the eye, infinite for the sky.
+    pub depth: f32,
+    /// Unit normal on the side of the eye, zero for the sky.
+    pub normal: Vec3,
+}
+
+impl<'a> Shader<'a> {
+    pub fn new(mesh: &'a Mesh, lighting: &Lighting, shadows: bool) -> Self {
+        Self { mesh, lighting: *lighting, shadows }
+    }
+
+    /// Shades what `ray` hit. Both sides of a surface look alike.
+    #[inline(always)]
+    pub fn shade(&self, ray: &Ray, hit: &Hit) -> Shade {
+        if !hit.is_hit() {
+            let (base, depth) = (self.sky(ray.direction), f32::INFINITY);
+            return Shade { base, key: Vec3::ZERO, shadow: None, depth, normal: Vec3::ZERO };
+        }
+        let corners = self.mesh.corners(hit.primitive);
+        let normal = unit_normal(hit.normal, corners);
+        let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+        let color = self.mesh.color(hit.primitive, hit.u, hit.v);
+        let mut shade = Shade {
+            base: color * self.lighting.ambient.irradiance(normal),
+            key: Vec3::ZERO,
+            shadow: None,
+            depth: hit.t * ray.direction.length(),
+            normal,
+        };
+
+        // A surface that is turned away from the light needs no ray to know that it is dark.
+        let origin = offset_point(&corners.map(|p| p.to_array()), hit.u, hit.v, normal);
+        let way = self.lighting.key.from(origin);
+        let cosine = normal.dot(way.toward);
+        if cosine > 0.0 {
+            let key = color * way.irradiance * cosine;
+            if self.shadows {
+                shade.key = key;
+                shade.shadow = Some(Ray::segment(origin, way.toward, 0.0, way.distance));
+            } else {
+                shade.base += key;
+            }
+        }
+        shade
+    }
+
+    /// The sky in a direction: pale at the horizon, darker toward the zenith, grey below.
+    #[inline]
+    fn sky(&self, direction: Vec3) -> Vec3 {
+        const ZENITH: Vec3 = Vec3::new(0.18, 0.36, 0.68);
+        const HORIZON: Vec3 = Vec3::new(0.72, 0.8, 0.88);
+        const BELOW: Vec3 = Vec3::new(0.36, 0.35, 0.34);
+        let height = direction.dot(self.up()) / direction.length();
+        if height >= 0.0 {
+            // The square root lets the colour change fast near the horizon.
+            HORIZON + (ZENITH - HORIZON) * height.sqrt()
+        } else {
+            HORIZON + (BELOW - HORIZON) * (-height * 8.0).min(1.0)
+        }
+    }
+
+    fn up(&self) -> Vec3 {
+        self.lighting.ambient.up
+    }
+}
+
+/// The unit vector along a triangle's normal. Squares of very small and very large normals
+/// underflow and overflow, so it is brought to the size of 1 first.
+#[inline(always)]
+fn unit_normal(normal: Vec3, corners: [Vec3; 3]) -> Vec3 {
+    let greatest = normal.abs().max_element();
+    if greatest > f32::MIN_POSITIVE && greatest < f32::MAX {
+        (normal / greatest).normalize()
+    } else {
+        let [p0, p1, p2] = corners.map(|p| p.as_dvec3());
+        (p1 - p0).cross(p2 - p0).normalize_or(DVec3::Y).as_vec3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Ambient, Light};
+
+    fn floor(size: f32) -> Mesh {
+        Mesh {
+            positions: vec![Vec3::ZERO, Vec3::Z * size, Vec3::X * size],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        }
+    }
+
+    const LIGHTING: Lighting = Lighting {
+        key: Light::Sun { toward: Vec3::Y, irradiance: Vec3::ONE },
+        ambient: Ambient { up: Vec3::Y, sky: Vec3::splat(0.5), ground: Vec3::ZERO },
+    };
+
+    fn hit(size: f32) -> Hit {
+        Hit { t: 2.0, u: 0.25, v: 0.25, primitive: 0, normal: Vec3::Y * size * size }
+    }
+
+    #[test]
+    fn a_floor_under_the_sun_gets_its_light_and_the_skys() {
+        let mesh = floor(1.0);
+        let down = Ray::new(Vec3::new(0.25, 4.0, 0.25), Vec3::NEG_Y * 2.0);
+        let shade = Shader::new(&mesh, &LIGHTING, true).shade(&down, &hit(1.0));
+        assert_eq!((shade.base, shade.key), (Vec3::splat(0.35), Vec3::splat(0.7)));
+        assert_eq!((shade.depth, shade.normal), (4.0, Vec3::Y));
+        let shadow = shade.shadow.expect("it faces the light");
+        assert_eq!((shadow.direction, shadow.tfar), (Vec3::Y, f32::INFINITY));
+        assert!(shadow.origin.y > 0.0);
+
+        let shade = Shader::new(&mesh, &LIGHTING, false).shade(&down, &hit(1.0));
+        assert!(shade.shadow.is_none());
+        assert_eq!(shade.base, Vec3::splat(0.35) + Vec3::splat(0.7));
+    }
+
+    #[test]
+    fn from_below_it_is_its_other_side_that_is_seen() {
+        let mesh = floor(1.0);
+        let up = Ray::new(Vec3::new(0.25, -2.0, 0.25), Vec3::Y);
+        let shade = Shader::new(&mesh, &LIGHTING, true).shade(&up, &hit(1.0));
+        assert_eq!(shade.normal, Vec3::NEG_Y);
+        assert!(shade.shadow.is_none(), "turned away from the light");
+        assert_eq!(shade.base, Vec3::ZERO);
+    }
+
+    #[test]
+    fn normals_of_any_length_become_unit_vectors() {
+        for size in [1e-30f32, 1e-18, 1e-6, 1.0, 1e6, 1e18, 1e30] {
+            let corners = floor(size).corners(0);
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            assert_eq!(unit_normal(normal, corners), Vec3::Y, "{size}");
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! What a frame cost.
+
+use serde::Serialize;
+use std::iter::Sum;
+use std::ops::AddAssign;
+use std::time::Duration;
+
+/// Rays of one kind, counted by one worker.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tally {
+    pub rays: u64,
+    /// Time in which the worker made and traced them.
+    pub time: Duration,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.time += other.time;
+    }
+}
+
+impl Sum for Tally {
+    fn sum<I: Iterator<Item = Self>>(tallies: I) -> Self {
+        tallies.fold(Self::default(), |mut sum, tally| {
+            sum += tally;
+            sum
+        })
+    }
+}
+
+/// Rays of one kind in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RayCount {
+    /// How many.
+    pub rays: u64,
+    /// Seconds that went into making and tracing them, averaged over the workers.
+    pub seconds: f64,
+    /// Rays per second of all workers together; 0 if there were none.
+    pub rays_per_s: f64,
+}
+
+impl RayCount {
+    pub(super) fn new(tally: Tally, workers: usize) -> Self {
+        Self::of(tally.rays, tally.time.as_secs_f64() / workers as f64)
+    }
+
+    /// A number of rays in a number of seconds.
+    pub fn of(rays: u64, seconds: f64) -> Self {
+        let rays_per_s = if rays > 0 && seconds > 0.0 { rays as f64 / seconds } else { 0.0 };
+        Self { rays, seconds, rays_per_s }
+    }
+}
+
+/// What a frame cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FrameStats {
+    /// Rays from the eye.
+    pub camera: RayCount,
+    /// Rays to the light.
+    pub shadow: RayCount,
+    /// All rays, with the frame's whole time: shading and assembly included.
+    pub total: RayCount,
+    /// Wall-clock time of the frame in seconds.
+    pub seconds: f64,
+    /// Tiles.
+    pub tiles: usize,
+    /// Workers.
+    pub threads: usize,
+    /// Workers that were bound to a processor.
+    pub pinned: usize,
+}
