@@ -1,1 +1,148 @@
-//! Profiles: every tunable in one TOML file. (STUB, owned by render.)
+//! Profiles: every tunable in one TOML file.
+//!
+//! Nothing in a profile changes a picture; it changes how long the picture takes. A key that is
+//! left out has its default, and an unknown one is an error, so that a misspelt key does not pass
+//! for a setting without effect.
+
+use crate::error::{Error, Result};
+use crate::kdtree::BuildParams;
+use crate::render::Tuning;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The name of the profile that is used when none is named.
+pub const DEFAULT: &str = "default";
+
+/// The profiles that are compiled in: names and texts.
+const BUILT_IN: [(&str, &str); 1] = [(DEFAULT, include_str!("../profiles/default.toml"))];
+
+/// The folder, below the current one, in which names are looked up.
+const FOLDER: &str = "profiles";
+
+/// Every tunable.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Profile {
+    /// How trees are built.
+    pub build: BuildParams,
+    /// How frames are made.
+    pub render: Tuning,
+}
+
+impl Profile {
+    /// Finds a profile.
+    ///
+    /// A name is looked up in the folder `profiles` below the current one, then among those that
+    /// are compiled in. What ends in `.toml` or has a folder in it is a path.
+    ///
+    /// # Errors
+    /// There is no such profile, it cannot be read, or something in it makes no sense: the
+    /// message names the file and the key.
+    pub fn find(name: &str) -> Result<Self> {
+        if name.ends_with(".toml") || Path::new(name).components().count() != 1 {
+            return Self::read(name);
+        }
+        let path = Path::new(FOLDER).join(format!("{name}.toml"));
+        match fs::read_to_string(&path) {
+            Ok(text) => Self::parse(&path, &text),
+            Err(error) if error.kind() == ErrorKind::NotFound => Self::built_in(name),
+            Err(source) => Err(Error::Read { path, source }),
+        }
+    }
+
+    /// Reads a profile's file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or something in it makes no sense.
+    pub fn read(path: impl Into<PathBuf>) -> Result<Self> {
+        let path = path.into();
+        match fs::read_to_string(&path) {
+            Ok(text) => Self::parse(&path, &text),
+            Err(source) => Err(Error::Read { path, source }),
+        }
+    }
+
+    fn built_in(name: &str) -> Result<Self> {
+        let Some((name, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) else {
+            let known = BUILT_IN.map(|(name, _)| name).join(", ");
+            let message = format!(
+                "there is no {FOLDER}/{name}.toml here, and only {known} is built in; give a name or a path"
+            );
+            return Err(Error::option("--profile", message));
+        };
+        Self::parse(&Path::new(FOLDER).join(format!("{name}.toml")), text)
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<Self> {
+        let profile: Self = toml::from_str(text).map_err(|error| Error::toml(path, text, &error))?;
+        profile.check().map_err(|error| Error::malformed(path, error.to_string()))?;
+        Ok(profile)
+    }
+
+    /// Checks that every value makes sense.
+    ///
+    /// # Errors
+    /// [`Error::Option`] naming the first key whose value does not.
+    pub fn check(&self) -> Result<()> {
+        self.build.check()?;
+        self.render.check()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_profile_is_the_default() {
+        assert_eq!(Profile::built_in(DEFAULT).expect("a profile"), Profile::default());
+    }
+
+    #[test]
+    fn the_default_profile_names_every_key() {
+        let written: toml::Table = toml::from_str(BUILT_IN[0].1).expect("TOML");
+        let all = toml::Table::try_from(Profile::default()).expect("TOML");
+        for (section, keys) in &all {
+            for key in keys.as_table().expect("a section").keys() {
+                assert!(written[section].get(key).is_some(), "{section}.{key} is missing");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let profile = Profile::parse(Path::new("p.toml"), "[render]\npacket = 4\n").expect("a profile");
+        assert_eq!(profile.render.packet.width(), 4);
+        assert_eq!(profile.build, BuildParams::default());
+    }
+
+    #[test]
+    fn faults_name_the_file_and_the_key() {
+        for (text, expected) in [
+            ("[render]\ntiles = 3", "p.toml: line 2: unknown field `tiles`"),
+            ("[rander]\ntile = 3", "p.toml: line 1: unknown field `rander`"),
+            ("[build]\nbin = 3", "p.toml: line 2: unknown field `bin`"),
+            ("[render]\npacket = 5", "p.toml: line 2: packet = 5 is not one of 1, 4, 8, 16"),
+            ("[render]\ntile = 0", "p.toml: render.tile: 0 is not"),
+            ("[render]\ntile = -1", "p.toml: line 2: invalid value"),
+            ("[render]\nthreads = 99999", "p.toml: render.threads: 99999 are too many"),
+            ("[render]\npin = 1", "p.toml: line 2: invalid type"),
+            ("[build]\ntraversal_cost = -1.0", "p.toml: build.traversal_cost: must be"),
+            ("[build]\nbins = 1", "p.toml: build.bins: must be"),
+            ("render", "p.toml: line 1: "),
+        ] {
+            let message = Profile::parse(Path::new("p.toml"), text).expect_err(text).to_string();
+            assert!(message.starts_with(expected) && !message.contains('\n'), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn unknown_names_say_what_there_is() {
+        let message = Profile::find("nonsense").expect_err("no such profile").to_string();
+        assert!(message.contains("profiles/nonsense.toml") && message.contains("default"), "{message}");
+        let message = Profile::find("no/such.toml").expect_err("no such file").to_string();
+        assert!(message.starts_with("cannot read no/such.toml"), "{message}");
+    }
+}
