@@ -48,6 +48,13 @@ pub(super) fn parse(
             continue;
         }
         let (models, materials) = parsed.map_err(|e| format!("line {}: {e}", feed.line))?;
+        if feed.vertices() > u64::from(u32::MAX) {
+            return Err(format!(
+                "{} vertices, at most {} are possible; split the model",
+                feed.vertices(),
+                u32::MAX
+            ));
+        }
         feed.refuse_non_finite()?;
         let colored = feed.colored_vertices > 0;
         feed.report(report);
@@ -72,7 +79,6 @@ fn merge(models: Vec<tobj::Model>, materials: Vec<tobj::Material>, colored: bool
     let no_material = materials.len() as u32;
     let mut some_without = false;
     for tobj::Model { mesh: model, .. } in models {
-        // Below MAX_TRIANGLES by far wherever tobj's own u32 indices hold.
         let base = mesh.positions.len() as u32;
         mesh.positions.extend(model.positions.as_chunks().0.iter().map(|&p| Vec3::from_array(p)));
         mesh.triangles.extend(model.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| base + i)));
