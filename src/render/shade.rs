@@ -74,17 +74,13 @@ impl<'a> Shader<'a> {
         const ZENITH: Vec3 = Vec3::new(0.18, 0.36, 0.68);
         const HORIZON: Vec3 = Vec3::new(0.72, 0.8, 0.88);
         const BELOW: Vec3 = Vec3::new(0.36, 0.35, 0.34);
-        let height = direction.dot(self.up()) / direction.length();
+        let height = direction.dot(self.lighting.ambient.up) / direction.length();
         if height >= 0.0 {
             // The square root lets the colour change fast near the horizon.
             HORIZON + (ZENITH - HORIZON) * height.sqrt()
         } else {
             HORIZON + (BELOW - HORIZON) * (-height * 8.0).min(1.0)
         }
-    }
-
-    fn up(&self) -> Vec3 {
-        self.lighting.ambient.up
     }
 }
 
@@ -116,7 +112,7 @@ mod tests {
 
     const LIGHTING: Lighting = Lighting {
         key: Light::Sun { toward: Vec3::Y, irradiance: Vec3::ONE },
-        ambient: Ambient { up: Vec3::Y, sky: Vec3::splat(0.5), ground: Vec3::ZERO },
+        ambient: Ambient { up: Vec3::Y, toward: Vec3::Y, sky: Vec3::splat(0.5), ground: Vec3::ZERO },
     };
 
     fn hit(size: f32) -> Hit {

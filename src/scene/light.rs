@@ -61,11 +61,14 @@ impl Light {
 /// Light that comes from all directions, more of it from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ambient {
-    /// Unit vector upward. The sky's colour follows it too.
+    /// Unit vector upward, for the colours of the sky behind the scene.
     pub up: Vec3,
-    /// Light on a surface that faces upward.
+    /// Unit vector to where it is brightest. A little off `up`, so that walls which meet at a
+    /// corner differ in the shadow too.
+    pub toward: Vec3,
+    /// Light on a surface that faces `toward`.
     pub sky: Vec3,
-    /// Light on a surface that faces downward.
+    /// Light on a surface that faces away.
     pub ground: Vec3,
 }
 
@@ -73,8 +76,7 @@ impl Ambient {
     /// Light on a surface with the unit normal `normal`.
     #[inline(always)]
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
-        let upward = 0.5 + 0.5 * normal.dot(self.up);
-        self.ground + (self.sky - self.ground) * upward
+        self.ground + (self.sky - self.ground) * (0.5 + 0.5 * normal.dot(self.toward))
     }
 }
 
@@ -102,20 +104,20 @@ impl Lighting {
         // How far the view points up or down must not take the sun below the horizon.
         let ahead = (forward - upward * forward.dot(upward)).normalize_or(up);
         let toward = (upward * 1.25 - right * 0.95 - ahead * 0.55).normalize();
-        let key = if sees_sky(accel, camera.eye, toward, [right, upward]) {
-            Light::Sun { toward, irradiance: SUN }
-        } else {
-            lamp(camera, accel, upward * 0.5 - right * 0.35 - ahead * 0.1)
-        };
-        let ambient = match key {
-            Light::Sun { .. } => {
-                Ambient { up: upward, sky: Vec3::new(0.42, 0.5, 0.62), ground: Vec3::new(0.2, 0.18, 0.16) }
-            }
-            Light::Point { .. } => {
-                Ambient { up: upward, sky: Vec3::new(0.3, 0.31, 0.33), ground: Vec3::new(0.2, 0.18, 0.16) }
-            }
-        };
-        Self { key, ambient }
+        if sees_sky(accel, camera.eye, toward, [right, upward]) {
+            return Self::outdoors(upward, toward);
+        }
+        let key = lamp(camera, accel, upward * 0.5 - right * 0.35 - ahead * 0.1);
+        let (sky, ground) = (Vec3::new(0.33, 0.34, 0.36), Vec3::new(0.13, 0.12, 0.11));
+        let toward = (upward + toward * 0.7).normalize();
+        Self { key, ambient: Ambient { up: upward, toward, sky, ground } }
+    }
+
+    /// A sun in a blue sky. Both are unit vectors: upward, and to the sun.
+    pub fn outdoors(up: Vec3, toward: Vec3) -> Self {
+        let (sky, ground) = (Vec3::new(0.42, 0.5, 0.62), Vec3::new(0.2, 0.18, 0.16));
+        let ambient = Ambient { up, toward: (up + toward * 0.7).normalize_or(up), sky, ground };
+        Self { key: Light::Sun { toward, irradiance: SUN }, ambient }
     }
 }
 

@@ -1,0 +1,184 @@
+//! `raypack info MODEL`: what is in a model, and what its tree is like.
+
+use super::model::{Model, Scene, SceneReport};
+use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, grouped};
+use crate::error::{Error, Result};
+use crate::kdtree::TreeStats;
+use crate::mesh::{Colors, Mesh};
+use crate::profile::{self, Profile};
+use crate::simd::Isa;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Say what is in a model and what its tree is like
+#[derive(Clone, Debug, clap::Args)]
+pub struct Args {
+    /// The model: .obj or .ply
+    model: PathBuf,
+    /// Prove that the tree is whole: every triangle is found in every leaf that it overlaps
+    #[arg(long)]
+    validate: bool,
+    /// Settings for building: a name in profiles/ or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
+    profile: String,
+    #[command(flatten)]
+    json: Json,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    engine: Engine,
+    #[serde(flatten)]
+    scene: SceneReport<'a>,
+    colors: ColorReport<'a>,
+    memory: Memory,
+    /// `true` if the tree was validated; it is an error if it is not valid.
+    validated: bool,
+}
+
+/// Where the triangles' colours come from.
+#[derive(Debug, Serialize)]
+struct ColorReport<'a> {
+    kind: &'static str,
+    /// Names and how many triangles have them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    materials: Vec<MaterialReport<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct MaterialReport<'a> {
+    name: &'a str,
+    triangles: u64,
+    diffuse: [f32; 3],
+}
+
+/// Bytes by part.
+#[derive(Debug, Serialize)]
+struct Memory {
+    positions: usize,
+    indices: usize,
+    colors: usize,
+    tree_nodes: usize,
+    tree_references: usize,
+    tree_triangles: usize,
+    total: usize,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<()> {
+    let isa = Isa::from_env()?;
+    let profile = Profile::find(&args.profile)?;
+    args.json.check()?;
+    let scene = Model::read(&args.model)?.build(&profile.build, isa)?;
+    if args.validate {
+        let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
+        scene.accel.tree().validate().map_err(fault)?;
+    }
+    let report = Report {
+        engine: ENGINE,
+        scene: scene.report(),
+        colors: colors(&scene.model.mesh),
+        memory: memory(&scene.model.mesh, &scene.tree),
+        validated: args.validate,
+    };
+    args.json.give(&text(&scene, &report), &report)
+}
+
+fn colors(mesh: &Mesh) -> ColorReport<'_> {
+    let (kind, materials) = match &mesh.colors {
+        Colors::Uniform(_) => ("uniform", Vec::new()),
+        Colors::PerTriangle(_) => ("per triangle", Vec::new()),
+        Colors::PerVertex(_) => ("per vertex", Vec::new()),
+        Colors::PerMaterial { materials, of_triangle } => {
+            let mut counts = vec![0u64; materials.len()];
+            for &material in of_triangle {
+                counts[material as usize] += 1;
+            }
+            let reports = materials.iter().zip(counts).map(|(material, triangles)| MaterialReport {
+                name: &material.name,
+                triangles,
+                diffuse: material.diffuse.to_array(),
+            });
+            ("per material", reports.collect())
+        }
+    };
+    ColorReport { kind, materials }
+}
+
+fn memory(mesh: &Mesh, tree: &TreeStats) -> Memory {
+    let positions = size_of_val(&mesh.positions[..]);
+    let indices = size_of_val(&mesh.triangles[..]);
+    let mut memory = Memory {
+        positions,
+        indices,
+        colors: mesh.bytes().saturating_sub(positions + indices),
+        tree_nodes: tree.node_bytes,
+        tree_references: tree.reference_bytes,
+        tree_triangles: tree.triangle_bytes,
+        total: 0,
+    };
+    memory.total = mesh.bytes() + memory.tree_nodes + memory.tree_references + memory.tree_triangles;
+    memory
+}
+
+fn text(scene: &Scene, report: &Report<'_>) -> String {
+    let mut lines = Lines::default();
+    scene.describe(&mut lines);
+    let tree = &scene.tree;
+    lines.add(
+        "leaves",
+        format!(
+            "{} empty, {:.2} triangles in the others on average, {} at most",
+            grouped(tree.empty_leaves as u64),
+            tree.triangles_per_leaf,
+            tree.largest_leaf
+        ),
+    );
+    lines.add(
+        "a ray",
+        format!(
+            "that meets the bounds is expected to take {:.1} steps, {:.1} leaves and {:.1} triangle tests",
+            tree.expected_steps, tree.expected_leaves, tree.expected_tests
+        ),
+    );
+    let bounds = scene.accel.bounds();
+    let (low, high, extent) = (bounds.min, bounds.max, bounds.extent());
+    lines.add(
+        "bounds",
+        format!(
+            "{},{},{} to {},{},{}; extent {} x {} x {}",
+            low.x, low.y, low.z, high.x, high.y, high.z, extent.x, extent.y, extent.z
+        ),
+    );
+    let materials = &report.colors.materials;
+    let kind = report.colors.kind;
+    if materials.is_empty() {
+        lines.add("colors", kind);
+    } else {
+        lines.add("colors", format!("{kind}, {}", counted(materials.len() as u64, "material")));
+        for material in materials {
+            let [r, g, b] = material.diffuse;
+            let triangles = counted(material.triangles, "triangle");
+            lines.add("", format!("{} ({r:.3} {g:.3} {b:.3}), {triangles}", material.name));
+        }
+    }
+    let memory = &report.memory;
+    let part = |amount: usize| bytes(amount as u64);
+    lines.add(
+        "memory",
+        format!(
+            "{}: positions {}, indices {}, colors {}, tree nodes {}, references {}, triangles {}",
+            part(memory.total),
+            part(memory.positions),
+            part(memory.indices),
+            part(memory.colors),
+            part(memory.tree_nodes),
+            part(memory.tree_references),
+            part(memory.tree_triangles)
+        ),
+    );
+    if report.validated {
+        lines.add("valid", "every triangle is found in every leaf that it overlaps");
+    }
+    lines.text().to_owned()
+}

@@ -1,0 +1,134 @@
+//! From a model's name to a tree: read or generated, and built.
+
+use super::progress::{Bar, watch};
+use super::report::{Lines, bytes, duration, grouped};
+use crate::error::Result;
+use crate::kdtree::{BuildParams, BuildProgress, TreeStats};
+use crate::mesh::generate::plant;
+use crate::mesh::{self, Mesh, ReadReport};
+use crate::simd::Isa;
+use crate::traverse::Accel;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+use tracing::info;
+
+/// A mesh and where it came from.
+#[derive(Debug)]
+pub struct Model {
+    /// Its file's path, or what it is.
+    pub name: String,
+    /// The mesh.
+    pub mesh: Mesh,
+    /// What the reader has to say; `None` for what was not read.
+    pub report: Option<ReadReport>,
+    /// The time that it took to read or generate.
+    pub seconds: f64,
+}
+
+impl Model {
+    /// Reads a model's file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let start = Instant::now();
+        let bar = Bar::new("reading");
+        let loaded = mesh::read_with_progress(path, &|fraction| bar.set(f64::from(fraction)))?;
+        let seconds = start.elapsed().as_secs_f64();
+        info!("read {} in {}", path.display(), duration(seconds));
+        let name = path.display().to_string();
+        Ok(Self { name, mesh: loaded.mesh, report: Some(loaded.report), seconds })
+    }
+
+    /// The scene that is rendered when none is named.
+    pub fn demo() -> Self {
+        let start = Instant::now();
+        let mesh = plant::demo();
+        let seconds = start.elapsed().as_secs_f64();
+        Self { name: "process plant (built-in demo)".into(), mesh, report: None, seconds }
+    }
+
+    /// Builds its tree.
+    pub fn build(self, params: &BuildParams, isa: Isa) -> Result<Scene> {
+        let start = Instant::now();
+        let progress = BuildProgress::default();
+        let accel = watch(
+            "building",
+            || progress.fraction(),
+            || Accel::build_with_progress(&self.mesh, params, &progress),
+        )?;
+        let build_seconds = start.elapsed().as_secs_f64();
+        info!("built the tree in {}", duration(build_seconds));
+        let tree = accel.stats();
+        Ok(Scene { model: self, accel: accel.with_isa(isa), tree, build_seconds })
+    }
+}
+
+/// A model made ready for tracing.
+pub struct Scene {
+    /// The model.
+    pub model: Model,
+    /// Its tree, with the instruction set chosen.
+    pub accel: Accel,
+    /// Figures about the tree.
+    pub tree: TreeStats,
+    /// The time that the build took.
+    pub build_seconds: f64,
+}
+
+/// What reports say about a scene.
+#[derive(Debug, Serialize)]
+pub struct SceneReport<'a> {
+    model: &'a str,
+    triangles: usize,
+    vertices: usize,
+    /// Least and greatest corner.
+    bounds: [[f32; 3]; 2],
+    read_seconds: f64,
+    read_report: Option<&'a ReadReport>,
+    build_seconds: f64,
+    tree: &'a TreeStats,
+}
+
+impl Scene {
+    /// The report's part about model and tree.
+    pub fn report(&self) -> SceneReport<'_> {
+        let (Model { name, mesh, report, seconds }, bounds) = (&self.model, self.accel.bounds());
+        SceneReport {
+            model: name,
+            triangles: mesh.triangles.len(),
+            vertices: mesh.positions.len(),
+            bounds: [bounds.min.to_array(), bounds.max.to_array()],
+            read_seconds: *seconds,
+            read_report: report.as_ref(),
+            build_seconds: self.build_seconds,
+            tree: &self.tree,
+        }
+    }
+
+    /// The same in words.
+    pub fn describe(&self, lines: &mut Lines) {
+        let Model { name, mesh, report, seconds } = &self.model;
+        lines.add("model", name);
+        let [triangles, vertices] = [mesh.triangles.len(), mesh.positions.len()].map(|n| grouped(n as u64));
+        lines.add("triangles", format!("{triangles} with {vertices} vertices"));
+        lines.add(if report.is_some() { "read" } else { "generated" }, duration(*seconds));
+        let summary = report.as_ref().map(ReadReport::summary).unwrap_or_default();
+        if !summary.is_empty() {
+            lines.add("repaired", summary);
+        }
+        lines.add("build", duration(self.build_seconds));
+        let tree = &self.tree;
+        lines.add(
+            "tree",
+            format!(
+                "{} nodes, {} leaves, {:.2} references per triangle, depth {}, SAH cost {:.1}, {}, {:.1} bytes per triangle",
+                grouped(tree.nodes as u64),
+                grouped(tree.leaves as u64),
+                tree.references_per_triangle,
+                tree.depth,
+                tree.sah_cost,
+                bytes((tree.node_bytes + tree.reference_bytes + tree.triangle_bytes) as u64),
+                tree.bytes_per_triangle,
+            ),
+        );
+    }
+}

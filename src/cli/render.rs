@@ -1,0 +1,193 @@
+//! `raypack render [SCENE] -o out.png`: a still or a camera path.
+
+mod report;
+
+use super::model::{Model, Scene};
+use super::outputs::Outputs;
+use super::progress::watch;
+use super::report::Json;
+use crate::error::{Error, Result};
+use crate::mesh::generate::plant;
+use crate::profile::{self, Profile};
+use crate::render::{RenderSettings, Renderer, Size, Tuning};
+use crate::scene::{Camera, Lighting, Orbit};
+use crate::simd::Isa;
+use crate::traverse::Kernel;
+use report::{Report, Shot};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tracing::{debug, info};
+
+/// The size of pictures of models: square, as benchmarks have it.
+const MODEL_SIZE: Size = Size { width: 1024, height: 1024 };
+
+/// The size of pictures of the demo.
+const DEMO_SIZE: Size = Size { width: 1280, height: 720 };
+
+/// The longest camera path.
+const MAX_FRAMES: u32 = 100_000;
+
+/// Render a picture, or a path of pictures, of a model
+///
+/// Prints what was rendered, how long each step took, and the rays per second by kind of ray.
+/// RAYPACK_ISA=portable|avx2|avx512 forces an instruction set.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Args {
+    /// The model: .obj or .ply; without it, the built-in process plant
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
+    /// The camera, or a TOML file with these keys; without it, the whole scene is framed. FOV is
+    /// vertical, in degrees (45 if left out); UP is 0,1,0 if left out
+    #[arg(long, value_name = "eye=X,Y,Z;at=X,Y,Z;up=X,Y,Z;fov=DEG", allow_hyphen_values = true)]
+    camera: Option<String>,
+    /// Width and height in pixels [default: 1024x1024, and 1280x720 for the built-in scene]
+    #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
+    size: Option<String>,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    samples: u32,
+    /// Worker threads; 0 for all processors [default: the profile's]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Keep each worker on one processor
+    #[arg(long)]
+    pin: bool,
+    /// Rays that are traced together: 1, 4, 8 or 16 [default: the profile's]
+    #[arg(long, value_name = "N")]
+    packet: Option<usize>,
+    /// Side of a tile in pixels [default: the profile's]
+    #[arg(long, value_name = "PIXELS")]
+    tile: Option<u32>,
+    /// Settings for building and rendering: a name in profiles/ or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
+    profile: String,
+    /// Leave out the shadows
+    #[arg(long)]
+    no_shadows: bool,
+    /// Render N frames while the eye goes round the point that it looks at: out_000.png and so on
+    #[arg(long, value_name = "N")]
+    orbit: Option<u32>,
+    /// Degrees from one frame of --orbit to the next; positive goes to the right
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 2.0,
+        requires = "orbit",
+        allow_negative_numbers = true
+    )]
+    step: f64,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<()> {
+    // Everything that can be wrong with the options, before any work.
+    let isa = Isa::from_env()?;
+    let profile = Profile::find(&args.profile)?;
+    let settings = args.settings(&profile)?;
+    let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
+    let orbit = args.orbit()?;
+    let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
+    args.outputs.check(args.orbit, &others)?;
+    args.json.check()?;
+    info!("profile {}, instruction set {isa}", args.profile);
+    debug!("{settings:?}");
+
+    let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
+    let scene = model.build(&profile.build, isa)?;
+    let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
+    let lighting = args.lighting(&camera, &scene);
+    let renderer = Renderer::new(&scene.accel, &scene.model.mesh, settings)?;
+
+    let cameras: Vec<Camera> = orbit.map_or_else(|| vec![camera], |orbit| orbit.cameras(camera).collect());
+    let mut shots = Vec::with_capacity(cameras.len());
+    let tiles_done = AtomicUsize::new(0);
+    let tiles = renderer.tile_count() * cameras.len();
+    let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
+    watch("rendering", fraction, || {
+        for (number, camera) in (0..).zip(cameras) {
+            let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done);
+            let file = args.outputs.write(&frame, number, args.orbit)?;
+            debug!("frame {number} in {:.4} s", stats.seconds);
+            shots.push(Shot { file, camera, stats });
+        }
+        Ok::<(), Error>(())
+    })?;
+
+    let report = Report::new(&scene, renderer.settings(), &args.profile, shots);
+    args.json.give(&report.text(&scene), &report)
+}
+
+impl Args {
+    fn settings(&self, profile: &Profile) -> Result<RenderSettings> {
+        let size = match &self.size {
+            Some(text) => text.parse()?,
+            None if self.scene.is_none() => DEMO_SIZE,
+            None => MODEL_SIZE,
+        };
+        let packet = match self.packet {
+            None => profile.render.packet,
+            Some(width) => Kernel::of_width(width)
+                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16")))?,
+        };
+        let tuning = Tuning {
+            packet,
+            tile: self.tile.unwrap_or(profile.render.tile),
+            threads: self.threads.unwrap_or(profile.render.threads),
+            pin: self.pin || profile.render.pin,
+        };
+        let settings = RenderSettings {
+            size,
+            samples: self.samples,
+            shadows: !self.no_shadows,
+            aovs: self.outputs.aovs(),
+            tuning,
+        };
+        settings.check().map_err(as_option)?;
+        Ok(settings)
+    }
+
+    fn orbit(&self) -> Result<Option<Orbit>> {
+        let Some(frames) = self.orbit else { return Ok(None) };
+        if !(1..=MAX_FRAMES).contains(&frames) {
+            let message = format!("{frames} is not a number of frames from 1 to {MAX_FRAMES}");
+            return Err(Error::option("--orbit", message));
+        }
+        if !self.step.is_finite() {
+            return Err(Error::option("--step", format!("{} is not a finite number of degrees", self.step)));
+        }
+        Ok(Some(Orbit { frames, step: self.step }))
+    }
+
+    fn default_camera(&self, scene: &Scene, size: Size) -> Camera {
+        if self.scene.is_none() {
+            let view = plant::demo_view();
+            Camera { fov: view.fov_degrees, ..Camera::new(view.eye, view.at) }
+        } else {
+            Camera::framing(&scene.accel.bounds(), size.aspect())
+        }
+    }
+
+    /// The demo has a sun of its own; other scenes get their light from over the camera's
+    /// shoulder. It stays where it is while the camera moves.
+    fn lighting(&self, camera: &Camera, scene: &Scene) -> Lighting {
+        if self.scene.is_none() {
+            Lighting::outdoors(crate::Vec3::Y, plant::demo_view().sun)
+        } else {
+            Lighting::for_view(camera, &scene.accel)
+        }
+    }
+}
+
+/// A fault of the settings, named by the option instead of the profile's key.
+fn as_option(error: Error) -> Error {
+    match error {
+        Error::Option { option, message } => {
+            let option = option.strip_prefix("render.").map_or(option.clone(), |key| format!("--{key}"));
+            Error::Option { option, message }
+        }
+        other => other,
+    }
+}

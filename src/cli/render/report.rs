@@ -1,0 +1,156 @@
+//! What `render` reports: the scene, the machine's part, and what each frame cost.
+
+use crate::cli::model::{Scene, SceneReport};
+use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
+use crate::render::{FrameStats, RayCount, RenderSettings, Size};
+use crate::scene::Camera;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// One rendered frame.
+#[derive(Debug, Serialize)]
+pub struct Shot {
+    /// Where its picture is.
+    pub file: PathBuf,
+    /// The camera.
+    pub camera: Camera,
+    /// What it cost.
+    #[serde(flatten)]
+    pub stats: FrameStats,
+}
+
+/// Everything there is to say.
+#[derive(Debug, Serialize)]
+pub struct Report<'a> {
+    engine: Engine,
+    #[serde(flatten)]
+    scene: SceneReport<'a>,
+    profile: &'a str,
+    isa: &'static str,
+    packet: usize,
+    tile: u32,
+    threads: usize,
+    pinned: usize,
+    size: Size,
+    samples: u32,
+    shadows: bool,
+    /// Rays and times of all frames together.
+    camera: RayCount,
+    shadow: RayCount,
+    total: RayCount,
+    frames: Vec<Shot>,
+}
+
+impl<'a> Report<'a> {
+    /// Gathers it. There must be at least one frame.
+    pub fn new(scene: &'a Scene, settings: &RenderSettings, profile: &'a str, frames: Vec<Shot>) -> Self {
+        let sum = |kind: fn(&FrameStats) -> RayCount| {
+            let counts = frames.iter().map(|shot| kind(&shot.stats));
+            let (rays, seconds) =
+                counts.fold((0, 0.0), |(rays, seconds), count| (rays + count.rays, seconds + count.seconds));
+            RayCount::of(rays, seconds)
+        };
+        Self {
+            engine: ENGINE,
+            scene: scene.report(),
+            profile,
+            isa: scene.accel.isa().name(),
+            packet: settings.tuning.packet.width(),
+            tile: settings.tuning.tile,
+            threads: frames[0].stats.threads,
+            pinned: frames[0].stats.pinned,
+            size: settings.size,
+            samples: settings.samples,
+            shadows: settings.shadows,
+            camera: sum(|stats| stats.camera),
+            shadow: sum(|stats| stats.shadow),
+            total: sum(|stats| stats.total),
+            frames,
+        }
+    }
+
+    /// The same in words.
+    pub fn text(&self, scene: &Scene) -> String {
+        let mut lines = Lines::default();
+        scene.describe(&mut lines);
+        lines.add("camera", self.frames[0].camera.to_string());
+        let samples = counted(u64::from(self.samples), "sample");
+        let shadows = if self.shadows { "shadows" } else { "no shadows" };
+        lines.add("picture", format!("{}, {samples} per pixel, {shadows}", self.size));
+        let Engine { version, build } = ENGINE;
+        let pinned = match self.pinned {
+            0 => "not pinned".into(),
+            all if all == self.threads => "pinned".into(),
+            some => format!("{some} pinned"),
+        };
+        let packets =
+            if self.packet == 1 { "single rays".into() } else { format!("packets of {}", self.packet) };
+        lines.add(
+            "engine",
+            format!(
+                "raypack {version} ({build}), {}, {packets}, tiles of {}x{}, {} ({pinned})",
+                self.isa,
+                self.tile,
+                self.tile,
+                counted(self.threads as u64, "thread"),
+            ),
+        );
+        if cfg!(debug_assertions) {
+            lines.add("warning", "a debug build traces slowly; use cargo run --release");
+        }
+        for (kind, count) in [("camera", self.camera), ("shadow", self.shadow)] {
+            if count.rays > 0 {
+                lines.add(kind, rays(&count));
+            }
+        }
+        lines.add("total", format!("{}, shading included", rays(&self.total)));
+        let mut text = lines.text().to_owned();
+        match &self.frames[..] {
+            [still] => writeln!(text, "{:<10} {}", "wrote", still.file.display()).expect("into a string"),
+            path => text.push_str(&frame_table(path)),
+        }
+        text
+    }
+}
+
+/// `1,234 rays in 5.6 ms: 0.22 M/s`.
+fn rays(count: &RayCount) -> String {
+    let RayCount { rays, seconds, rays_per_s } = *count;
+    format!("{} rays in {}: {} M/s", grouped(rays), duration(seconds), millions(rays_per_s))
+}
+
+fn millions(rays_per_s: f64) -> String {
+    format!("{:.2}", rays_per_s * 1e-6)
+}
+
+/// A line for each frame, and what they have in common.
+fn frame_table(shots: &[Shot]) -> String {
+    let mut text = String::from("\nframe   time ms   camera M/s   shadow M/s   total M/s   file\n");
+    for (number, Shot { file, stats, .. }) in shots.iter().enumerate() {
+        let [camera, shadow, total] =
+            [stats.camera, stats.shadow, stats.total].map(|count| millions(count.rays_per_s));
+        writeln!(
+            text,
+            "{number:>5} {:>9.2} {camera:>12} {shadow:>12} {total:>11}   {}",
+            stats.seconds * 1e3,
+            file.display()
+        )
+        .expect("into a string");
+    }
+    let mut times: Vec<f64> = shots.iter().map(|shot| shot.stats.seconds * 1e3).collect();
+    times.sort_by(f64::total_cmp);
+    let mean = times.iter().sum::<f64>() / times.len() as f64;
+    writeln!(
+        text,
+        "\n{:<10} {}, mean {mean:.2} ms, median {:.2} ms, {:.2} to {:.2} ms; {:.1} frames per second",
+        "frames",
+        times.len(),
+        times[times.len() / 2],
+        times[0],
+        times[times.len() - 1],
+        1e3 / mean,
+    )
+    .expect("into a string");
+    text
+}
