@@ -44,7 +44,7 @@ impl Default for BuildParams {
             bad_splits: 2,
             max_depth: 0,
             bins: 64,
-            exact_below: 4096,
+            exact_below: 1024,
             max_duplication: 12.0,
         }
     }

@@ -13,38 +13,44 @@ use crate::kdtree::sah::{CellCost, Split, cheaper};
 struct Bins {
     starts: Vec<u32>,
     ends: Vec<u32>,
-    low: f32,
-    width: f64,
+    /// Where bins begin, and where the last one ends.
+    boundaries: Vec<f32>,
+    inverse_width: f64,
+    /// Least and greatest coordinate of all references.
+    extent: (f32, f32),
 }
 
 impl Bins {
     fn new(references: &[Reference], cell: &Aabb, axis: usize, bins: usize) -> Self {
-        let (low, high) = (cell.min[axis], cell.max[axis]);
-        let width = (f64::from(high) - f64::from(low)) / bins as f64;
-        let mut counted = Self { starts: vec![0; bins], ends: vec![0; bins], low, width };
+        let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
+        let width = (high - low) / bins as f64;
+        let mut counted = Self {
+            starts: vec![0; bins],
+            ends: vec![0; bins],
+            boundaries: (0..=bins).map(|bin| (low + width * bin as f64) as f32).collect(),
+            inverse_width: 1.0 / width,
+            extent: (f32::INFINITY, f32::NEG_INFINITY),
+        };
         for reference in references {
-            let (start, end) = (counted.bin(reference.min[axis]), counted.bin(reference.max[axis]));
+            let (min, max) = (reference.min[axis], reference.max[axis]);
+            let (start, end) = (counted.bin(min), counted.bin(max));
             counted.starts[start] += 1;
             counted.ends[end] += 1;
+            counted.extent = (counted.extent.0.min(min), counted.extent.1.max(max));
         }
         counted
-    }
-
-    /// The lower boundary of a bin.
-    fn boundary(&self, bin: usize) -> f32 {
-        (f64::from(self.low) + self.width * bin as f64) as f32
     }
 
     /// The bin of a coordinate: the one whose boundaries hold it, exactly, so that counts and
     /// windows agree. A coordinate on a boundary belongs to the bin below it.
     fn bin(&self, x: f32) -> usize {
         let last = self.starts.len() - 1;
-        let guess = ((f64::from(x) - f64::from(self.low)) / self.width) as usize;
+        let guess = (f64::from(x - self.boundaries[0]) * self.inverse_width) as usize;
         let mut bin = guess.min(last);
-        while bin > 0 && x <= self.boundary(bin) {
+        while bin > 0 && x <= self.boundaries[bin] {
             bin -= 1;
         }
-        while bin < last && x > self.boundary(bin + 1) {
+        while bin < last && x > self.boundaries[bin + 1] {
             bin += 1;
         }
         bin
@@ -72,32 +78,33 @@ pub(super) fn best_split(
         for boundary in 1..bins {
             below += table.starts[boundary - 1] as usize;
             above -= table.ends[boundary - 1] as usize;
-            let split = cost.split(table.boundary(boundary), below, 0, above);
+            let split = cost.split(table.boundaries[boundary], below, 0, above);
             if split.cost.is_finite() && best.is_none_or(|(b, _)| split.cost < b.cost) {
                 best = Some((split, boundary));
             }
         }
     }
 
-    // Look closer around the best one, and at the cell's ends, where cutting off empty space pays.
+    // Look closer around the best one: its two bins hold the ends that may do better still.
     let (coarse, boundary) = best?;
-    let mut fine = None;
-    for axis in 0..3 {
-        let Some(table) = &counted[axis] else { continue };
-        let mut windows = vec![(0, 1), (bins - 1, bins)];
-        if axis == coarse.axis {
-            windows.push((boundary - 1, (boundary + 1).min(bins)));
-        }
-        for (from, to) in windows {
-            let low = if from == 0 { f32::NEG_INFINITY } else { table.boundary(from) };
-            let high = if to == bins { f32::INFINITY } else { table.boundary(to) };
-            let window = Window {
-                low,
-                high,
-                below: table.starts[..from].iter().sum::<u32>() as usize,
-                above: references.len() - table.ends[..from].iter().sum::<u32>() as usize,
-            };
-            fine = sweep(references, axis, &costs.axis(axis), window, fine, scratch);
+    let (axis, table) = (coarse.axis, counted[coarse.axis].as_ref()?);
+    let (from, to) = (boundary - 1, boundary + 1);
+    let window = Window {
+        low: if from == 0 { f32::NEG_INFINITY } else { table.boundaries[from] },
+        high: if to == bins { f32::INFINITY } else { table.boundaries[to] },
+        below: table.starts[..from].iter().sum::<u32>() as usize,
+        above: references.len() - table.ends[..from].iter().sum::<u32>() as usize,
+    };
+    let mut fine = sweep(references, axis, &costs.axis(axis), window, None, scratch);
+
+    // And at the cell's ends, where planes may cut off empty space.
+    for (axis, table) in counted.iter().enumerate() {
+        let Some(table) = table else { continue };
+        let (cost, count) = (costs.axis(axis), references.len());
+        let ends = [(table.extent.0, 0, count, false), (table.extent.1, count, 0, true)];
+        for (position, below, above, planar_below) in ends {
+            let cost = cost.cost(position, below, above);
+            fine = cheaper(fine, Split { axis, position, planar_below, cost });
         }
     }
     match fine {

@@ -23,12 +23,17 @@ impl Event {
         Self(u64::from(ordered) << 2 | kind)
     }
 
-    fn kind(self) -> u64 {
-        self.0 & 3
+    fn kind(self) -> usize {
+        (self.0 & 3) as usize
+    }
+
+    /// Equal for events in one plane.
+    fn plane(self) -> u64 {
+        self.0 >> 2
     }
 
     fn position(self) -> f32 {
-        let ordered = (self.0 >> 2) as u32;
+        let ordered = self.plane() as u32;
         f32::from_bits(if ordered >> 31 == 1 { ordered & !(1 << 31) } else { !ordered })
     }
 }
@@ -100,16 +105,18 @@ pub(super) fn sweep(
     events.sort_unstable();
 
     let (mut below, mut above) = (window.below, window.above);
-    let mut rest = events.as_slice();
-    while let Some(first) = rest.first() {
-        let here = rest.iter().take_while(|event| event.0 >> 2 == first.0 >> 2).count();
-        let (group, after) = rest.split_at(here);
-        let count = |kind| group.iter().filter(|event| event.kind() == kind).count();
-        let (ends, planar, starts) = (count(END), count(PLANAR), count(START));
+    let mut next = 0;
+    while let Some(&first) = events.get(next) {
+        // Count what ends, lies flat and begins in this plane.
+        let mut counts = [0; 3];
+        while let Some(event) = events.get(next).filter(|event| event.plane() == first.plane()) {
+            counts[event.kind()] += 1;
+            next += 1;
+        }
+        let [ends, planar, starts] = counts;
         above -= ends + planar;
         best = cheaper(best, cost.split(first.position(), below, planar, above));
         below += starts + planar;
-        rest = after;
     }
     best
 }
