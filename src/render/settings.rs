@@ -73,16 +73,17 @@ impl fmt::Display for Size {
 impl FromStr for Size {
     type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self> {
-        let wrong = || Error::option("--size", format!("\"{text}\" is not WIDTHxHEIGHT, such as 1280x720"));
-        let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    fn from_str(size: &str) -> Result<Self> {
+        let wrong = || Error::option("--size", format!("\"{size}\" is not WIDTHxHEIGHT, such as 1280x720"));
+        let (width, height) = size.split_once(['x', 'X']).ok_or_else(wrong)?;
         let side = |text: &str| {
             let text = text.trim();
             if text.is_empty() || !text.bytes().all(|b| b.is_ascii_digit()) {
                 return Err(wrong());
             }
-            // More digits than a u32 holds are merely too many pixels.
-            Ok(text.parse().unwrap_or(u32::MAX))
+            text.parse().map_err(|_| {
+                Error::option("--size", format!("{size} is too large; a side may have {MAX_SIDE} pixels"))
+            })
         };
         Self::new(side(width)?, side(height)?)
     }
