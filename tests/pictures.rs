@@ -3,6 +3,7 @@
 //! The golden picture is `tests/golden/plant.png`. When the look is meant to change, run
 //! `RAYPACK_REFRESH_GOLDEN=1 cargo test --test pictures`, look at the new one, and commit it.
 
+use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::generate::plant::{self, PlantParams};
 use raypack::render::{RenderSettings, Renderer, Size, image as pictures};
@@ -23,8 +24,8 @@ fn the_plant_looks_as_it_should() {
     let mesh = plant::generate(PlantParams { triangles: 30_000, seed: 1 });
     let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
     let view = plant::demo_view();
-    let camera = Camera { fov: view.fov_degrees, ..Camera::new(view.eye * 0.75, view.at) };
-    let lighting = Lighting::outdoors(raypack::Vec3::Y, view.sun);
+    let camera = Camera { fov: view.fov_degrees, ..Camera::new(view.eye * 0.42, Vec3::new(0.0, 6.0, 0.0)) };
+    let lighting = Lighting::outdoors(Vec3::Y, view.sun);
     let settings = RenderSettings { samples: 4, ..RenderSettings::new(SIZE) };
     let (frame, _) = Renderer::new(&accel, &mesh, settings).expect("settings").frame(&camera, &lighting);
 

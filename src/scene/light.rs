@@ -4,7 +4,7 @@
 //! the sky comes out at about 1, the brightest value that a PNG holds.
 
 use super::Camera;
-use crate::geometry::{Hit, Ray};
+use crate::geometry::Ray;
 use crate::traverse::Accel;
 use glam::Vec3;
 
@@ -96,21 +96,30 @@ impl Lighting {
     /// Light from over the camera's shoulder: from above and from the left of the eye, so that
     /// shadows fall to where the camera sees them.
     ///
-    /// It is a sun where the eye can see most of the sky around it; where a roof or a wall is in
-    /// the way, it is a lamp in the room, which nothing hides from the eye.
+    /// It is a sun if enough of what the camera sees lies in it. Where a roof or a wall is in the
+    /// way it is a lamp, the nearer to the eye the narrower the room is.
     pub fn for_view(camera: &Camera, accel: &Accel) -> Self {
         let [forward, right, up] = camera.axes().map(|axis| axis.as_vec3());
         let upward = camera.up.normalize_or(Vec3::Y);
         // How far the view points up or down must not take the sun below the horizon.
         let ahead = (forward - upward * forward.dot(upward)).normalize_or(up);
-        let toward = (upward * 1.25 - right * 0.95 - ahead * 0.55).normalize();
-        if sees_sky(accel, camera.eye, toward, [right, upward]) {
-            return Self::outdoors(upward, toward);
+        let from = |[over, left, behind]: [f32; 3]| upward * over - right * left - ahead * behind;
+        let sun = Self::outdoors(upward, from([1.25, 0.95, 0.55]).normalize());
+
+        let seen = Seen::new(camera, accel);
+        if seen.share_in(&sun.key, accel) >= ENOUGH {
+            return sun;
         }
-        let key = lamp(camera, accel, upward * 0.5 - right * 0.35 - ahead * 0.1);
-        let (sky, ground) = (Vec3::new(0.33, 0.34, 0.36), Vec3::new(0.13, 0.12, 0.11));
-        let toward = (upward + toward * 0.7).normalize();
-        Self { key, ambient: Ambient { up: upward, toward, sky, ground } }
+        let lamps = LAMP_DISTANCES.map(|distance| {
+            Self::indoors(upward, lamp(camera, accel, from([0.5, 0.35, 0.1]) * distance, seen.depth))
+        });
+        let share = |lighting: &Self| seen.share_in(&lighting.key, accel);
+        let best = |a: Self, b: Self| if share(&b) > share(&a) { b } else { a };
+        let [first, others @ ..] = lamps;
+        lamps
+            .into_iter()
+            .find(|lamp| share(lamp) >= ENOUGH)
+            .unwrap_or_else(|| others.into_iter().fold(first, best))
     }
 
     /// A sun in a blue sky. Both are unit vectors: upward, and to the sun.
@@ -119,41 +128,65 @@ impl Lighting {
         let ambient = Ambient { up, toward: (up + toward * 0.7).normalize_or(up), sky, ground };
         Self { key: Light::Sun { toward, irradiance: SUN }, ambient }
     }
+
+    /// A lamp in a room.
+    fn indoors(up: Vec3, lamp: Light) -> Self {
+        let (sky, ground) = (Vec3::new(0.33, 0.34, 0.36), Vec3::new(0.13, 0.12, 0.11));
+        Self { key: lamp, ambient: Ambient { up, toward: up, sky, ground } }
+    }
 }
 
-/// Whether most of a bundle of rays around `toward` leaves the scene.
-fn sees_sky(accel: &Accel, eye: Vec3, toward: Vec3, across: [Vec3; 2]) -> bool {
-    const SPREAD: [f32; 3] = [-0.2, 0.0, 0.2];
-    let open = SPREAD
-        .iter()
-        .flat_map(|x| SPREAD.map(|y| toward + across[0] * *x + across[1] * y))
-        .filter(|&direction| !accel.occluded(&Ray::new(eye, direction)))
-        .count();
-    2 * open > SPREAD.len() * SPREAD.len()
+/// The part of what is seen that is to lie in the key light.
+const ENOUGH: f32 = 0.3;
+
+/// How far from the eye a lamp is tried, in units of the depth of what is seen.
+const LAMP_DISTANCES: [f32; 4] = [1.0, 0.5, 0.25, 0.1];
+
+/// A coarse grid of what a camera sees.
+struct Seen {
+    /// Points just before the surfaces, and the normals on the eye's side.
+    points: Vec<(Vec3, Vec3)>,
+    /// The median distance from the eye.
+    depth: f32,
 }
 
-/// A lamp on the way from the eye along `offset` (in units of half of what is seen), but before
-/// whatever is met there.
-fn lamp(camera: &Camera, accel: &Accel, offset: Vec3) -> Light {
-    let depth = seen_depth(camera, accel);
+impl Seen {
+    fn new(camera: &Camera, accel: &Accel) -> Self {
+        const GRID: u32 = 16;
+        let view = camera.view(GRID, GRID);
+        let (mut points, mut depths) = (Vec::new(), Vec::new());
+        for i in 0..GRID * GRID {
+            let ray = view.ray(i % GRID, i / GRID, [0.5, 0.5]);
+            let hit = accel.intersect(&ray);
+            if hit.is_hit() {
+                let side = -hit.normal.dot(ray.direction).signum();
+                points.push((ray.at(hit.t * 0.9995), hit.normal * side));
+                depths.push(hit.t * ray.direction.length());
+            }
+        }
+        depths.sort_by(f32::total_cmp);
+        let median = depths.get(depths.len() / 2).copied().filter(|&depth| depth > 0.0);
+        Self { points, depth: median.unwrap_or_else(|| camera.distance()) }
+    }
+
+    /// The part of the points that a light reaches; all of them if there are none.
+    fn share_in(&self, light: &Light, accel: &Accel) -> f32 {
+        let lit = self.points.iter().filter(|&&(point, normal)| {
+            let way = light.from(point);
+            normal.dot(way.toward) > 0.0
+                && !accel.occluded(&Ray::segment(point, way.toward, 0.0, way.distance))
+        });
+        if self.points.is_empty() { 1.0 } else { lit.count() as f32 / self.points.len() as f32 }
+    }
+}
+
+/// A lamp on the way from the eye along `offset` (in units of `depth`), but before whatever is
+/// met there.
+fn lamp(camera: &Camera, accel: &Accel, offset: Vec3, depth: f32) -> Light {
     let way = offset * depth;
     let hit = accel.intersect(&Ray::new(camera.eye, way));
     let part = if hit.is_hit() { (hit.t * 0.7).min(1.0) } else { 1.0 };
     Light::Point { position: camera.eye + way * part, irradiance: LAMP, reach: depth * 1.5 }
-}
-
-/// The median distance of what the camera sees, over a coarse grid.
-fn seen_depth(camera: &Camera, accel: &Accel) -> f32 {
-    const GRID: u32 = 8;
-    let view = camera.view(GRID, GRID);
-    let mut depths: Vec<f32> = (0..GRID * GRID)
-        .map(|i| view.ray(i % GRID, i / GRID, [0.5, 0.5]))
-        .map(|ray| (accel.intersect(&ray), ray))
-        .filter(|(hit, _): &(Hit, Ray)| hit.is_hit())
-        .map(|(hit, ray)| hit.t * ray.direction.length())
-        .collect();
-    depths.sort_by(f32::total_cmp);
-    depths.get(depths.len() / 2).copied().filter(|&d| d > 0.0).unwrap_or_else(|| camera.distance())
 }
 
 #[cfg(test)]
@@ -162,19 +195,24 @@ mod tests {
     use crate::kdtree::BuildParams;
     use crate::mesh::{Colors, Mesh};
 
-    /// A cube from -1 to 1, without its ceiling if `open`.
+    /// The corners of a box that stands on y = -1 and reaches from -1 to 1 in x and z.
+    fn room_corners(height: f32) -> Vec<Vec3> {
+        let corner =
+            |i: u32| Vec3::new((i & 1) as f32 * 2.0, (i >> 1 & 1) as f32 * height, (i >> 2) as f32 * 2.0);
+        (0..8).map(|i| corner(i) - 1.0).collect()
+    }
+
+    fn quads(faces: &[[u32; 4]]) -> Vec<[u32; 3]> {
+        faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+    }
+
+    /// A closed room, or low walls without a ceiling if `open`.
     fn room(open: bool) -> Accel {
-        let positions = (0..8)
-            .map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0)
-            .collect();
-        let mut triangles: Vec<[u32; 3]> =
-            [[0, 1, 3, 2], [4, 5, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4]]
-                .iter()
-                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-                .collect();
+        let mut triangles = quads(&[[0, 1, 3, 2], [4, 5, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4]]);
         if !open {
-            triangles.extend([[2, 3, 7], [2, 7, 6]]);
+            triangles.extend(quads(&[[2, 3, 7, 6]]));
         }
+        let positions = room_corners(if open { 0.2 } else { 2.0 });
         let mesh = Mesh { positions, triangles, colors: Colors::default() };
         Accel::build(&mesh, &BuildParams::default()).expect("builds")
     }
@@ -205,8 +243,22 @@ mod tests {
 
     #[test]
     fn under_the_open_sky_it_is_the_sun_again() {
-        let camera = Camera::new(Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.0, 0.0, -0.5));
+        let camera = Camera::new(Vec3::new(0.0, -0.5, 0.9), Vec3::new(0.0, -1.0, -0.5));
         assert!(matches!(Lighting::for_view(&camera, &room(true)).key, Light::Sun { .. }));
+    }
+
+    #[test]
+    fn a_look_into_a_box_lights_its_inside() {
+        // The front wall is left out; the eye stands before it, under the open sky.
+        let mesh = Mesh {
+            positions: room_corners(2.0),
+            triangles: quads(&[[0, 1, 3, 2], [0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6]]),
+            colors: Colors::default(),
+        };
+        let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
+        let camera = Camera { fov: 35.0, ..Camera::new(Vec3::Z * 4.0, Vec3::ZERO) };
+        let lighting = Lighting::for_view(&camera, &accel);
+        assert!(Seen::new(&camera, &accel).share_in(&lighting.key, &accel) >= ENOUGH);
     }
 
     #[test]
