@@ -1,8 +1,9 @@
 //! Writing binary PLY.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::files;
 use crate::mesh::{Colors, Mesh, color};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Writes `mesh` as little-endian binary PLY, with a colour for each face (for each vertex, if
@@ -15,29 +16,11 @@ use std::path::Path;
 ///
 /// [`Error::Write`].
 pub fn write(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
-    let path = path.as_ref();
-    write_beside(path, mesh).map_err(|source| Error::Write { path: path.into(), source })
-}
-
-fn write_beside(path: &Path, mesh: &Mesh) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".raypack-").suffix(".part");
-    #[cfg(unix)]
-    {
-        // As any new file, within the user's mask: tempfile's default keeps others from reading.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut out = BufWriter::with_capacity(1 << 20, builder.tempfile_in(folder)?);
-    header(mesh, &mut out)?;
-    vertices(mesh, &mut out)?;
-    faces(mesh, &mut out)?;
-    out.into_inner()?.persist(path)?;
-    Ok(())
+    files::write_whole(path.as_ref(), |out| {
+        header(mesh, out)?;
+        vertices(mesh, out)?;
+        faces(mesh, out)
+    })
 }
 
 fn header(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
