@@ -3,6 +3,7 @@
 //! Reports go to standard output, everything else to standard error. Failures are one line there,
 //! `raypack: error: …`, and exit code 1; a command line that makes no sense is 2, as usual.
 
+mod bench;
 mod generate;
 mod info;
 mod model;
@@ -31,6 +32,7 @@ struct Cli {
 enum Command {
     Render(render::Args),
     Info(info::Args),
+    Bench(bench::Args),
     Generate(generate::Args),
 }
 
@@ -41,6 +43,7 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
+        Command::Bench(args) => bench::run(args),
         Command::Generate(args) => generate::run(args),
     };
     match result {

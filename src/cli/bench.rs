@@ -1,0 +1,153 @@
+//! `raypack bench MODEL`: rays per second, beside Embree and obvhs.
+
+use super::model::Model;
+use super::report::Json;
+use crate::error::{Error, Result};
+use crate::profile::{self, Profile};
+use crate::scene::Camera;
+use crate::simd::Isa;
+use crate::study::bench::{EngineName, Options, Pace, run as bench};
+use crate::study::rays::RayKind;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Measure rays per second by kind of ray, side by side with Embree and obvhs on the same rays.
+///
+/// Embree is taken from RAYPACK_EMBREE (a file or folder), from .embree (see scripts/get-embree) or from
+/// the system, and is compared in its best mode: packet widths 1, 4, 8 and 16, with and without the
+/// coherent flag, on medium, high and robust builds. RAYPACK_ISA=portable|avx2|avx512 holds raypack and
+/// Embree to an instruction set.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Args {
+    /// The model: .obj or .ply
+    model: PathBuf,
+    /// The camera, as eye=x,y,z;at=x,y,z;up=x,y,z;fov=DEG or a TOML file; without it the model is framed
+    #[arg(long)]
+    camera: Option<String>,
+    /// Width and height of the camera's image: one number, or WxH with both alike
+    #[arg(long, default_value = "512")]
+    size: String,
+    /// Kinds of ray
+    #[arg(long, value_delimiter = ',', default_value = "camera,shadow,diffuse,ao,random")]
+    rays: Vec<String>,
+    /// Engines
+    #[arg(long, value_delimiter = ',', default_value = "raypack,embree,obvhs")]
+    engines: Vec<String>,
+    /// Race with one thread, and with this many; 0 for all processors
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Settings for building: a name in profiles/ or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
+    profile: String,
+    /// Rounds of each race at most; its middle round is reported
+    #[arg(long, default_value_t = 9)]
+    rounds: usize,
+    /// Seconds after which a race begins no further round (three are always run)
+    #[arg(long, default_value_t = 10.0)]
+    seconds: f64,
+    /// Keep modes that are more than 25 % slower than their engine's best in the qualifying round
+    #[arg(long)]
+    all_modes: bool,
+    /// Pin each worker to a core
+    #[arg(long)]
+    pin: bool,
+    /// What the random rays hang on
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    json: Json,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// An option makes no sense, the model cannot be read, or the report cannot be written.
+pub fn run(args: &Args) -> Result<()> {
+    let options = options(args)?;
+    args.json.check()?;
+    let model = Model::read(&args.model)?;
+    let mut progress = |line: &str| {
+        if std::io::stderr().is_terminal() {
+            eprintln!("{line} …");
+        }
+    };
+    let report = bench(&model.name, &model.mesh, &options, &mut progress)?;
+    args.json.give(&report.to_string(), &report)
+}
+
+fn options(args: &Args) -> Result<Options> {
+    let hardware = std::thread::available_parallelism().map_or(1, usize::from);
+    let most = if args.threads == 0 { hardware } else { args.threads };
+    if most > 4096 {
+        return Err(Error::option("--threads", format!("{most} is more than 4096")));
+    }
+    if args.rounds == 0 {
+        return Err(Error::option("--rounds", "0 rounds measure nothing"));
+    }
+    if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
+        return Err(Error::option("--seconds", format!("{} is no time", args.seconds)));
+    }
+    Ok(Options {
+        kinds: args.rays.iter().map(|name| name.parse::<RayKind>()).collect::<Result<_>>()?,
+        engines: args.engines.iter().map(|name| name.parse::<EngineName>()).collect::<Result<_>>()?,
+        camera: args.camera.as_deref().map(Camera::parse).transpose()?,
+        size: size(&args.size)?,
+        threads: if most == 1 { vec![1] } else { vec![1, most] },
+        seed: args.seed,
+        pace: Pace { rounds: args.rounds, seconds: args.seconds, all_modes: args.all_modes, pin: args.pin },
+        isa: Isa::from_env()?,
+        hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
+        build: Profile::find(&args.profile)?.build,
+    })
+}
+
+/// `N` or `NxN`.
+fn size(text: &str) -> Result<u32> {
+    let (width, height) = text.split_once('x').unwrap_or((text, text));
+    match (width.parse(), height.parse::<u32>()) {
+        (Ok(w), Ok(h)) if w == h => Ok(w),
+        (Ok(_), Ok(_)) => Err(Error::option("--size", format!("{text}: bench takes square images only"))),
+        _ => Err(Error::option("--size", format!("\"{text}\" is no size; write 512 or 512x512"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(clap::Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn parse(line: &str) -> Result<Options> {
+        options(&Command::try_parse_from(line.split(' ')).unwrap().args)
+    }
+
+    #[test]
+    fn defaults_measure_everything() {
+        let options = parse("bench model.obj").unwrap();
+        assert_eq!(options.kinds, RayKind::ALL);
+        assert_eq!(options.engines, EngineName::ALL);
+        assert_eq!((options.size, options.camera, options.threads[0]), (512, None, 1));
+    }
+
+    #[test]
+    fn options_that_make_no_sense_are_named() {
+        for (line, option) in [
+            ("bench m.obj --size 512x256", "--size"),
+            ("bench m.obj --size big", "--size"),
+            ("bench m.obj --threads 5000", "--threads"),
+            ("bench m.obj --rounds 0", "--rounds"),
+            ("bench m.obj --seconds nan", "--seconds"),
+            ("bench m.obj --rays camera,primary", "--rays"),
+            ("bench m.obj --engines optix", "--engines"),
+            ("bench m.obj --camera eye=1", "--camera"),
+        ] {
+            let message = parse(line).unwrap_err().to_string();
+            assert!(message.starts_with(option) && !message.contains('\n'), "{line}: {message}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The report as text: one table of best modes, one of all of them.
+
+use super::report::{Report, Row};
+use std::fmt::{self, Write};
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let h = &self.header;
+        writeln!(f, "{}: {} triangles, camera {}, {} x {}", h.model, h.triangles, h.camera, h.size, h.size)?;
+        writeln!(
+            f,
+            "{}, {} hardware threads, {} build, seed {}",
+            h.machine, h.hardware_threads, h.build, h.seed
+        )?;
+        let engines: Vec<String> =
+            h.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
+        writeln!(f, "{}, {}", engines.join(", "), h.date)?;
+        writeln!(f, "\nMillion rays a second, median of the rounds; the best mode of each engine\n")?;
+        write!(f, "{}", grid(&self.summary()))?;
+        writeln!(f, "\nEvery mode that ran\n")?;
+        write!(f, "{}", grid(&self.modes()))?;
+        if !self.agreements.is_empty() {
+            writeln!(f, "\nDisagreements (hit against miss, or t apart by more than 1e-4)\n")?;
+            write!(f, "{}", grid(&self.agreement_lines()))?;
+        }
+        self.notes.iter().try_for_each(|note| writeln!(f, "\nnote: {note}"))
+    }
+}
+
+impl Report {
+    /// A line for each race: every engine's best mode, and raypack's ratio to each rival.
+    fn summary(&self) -> Vec<Vec<String>> {
+        let names: Vec<&str> = self.header.engines.iter().map(|e| e.name).collect();
+        let rivals: Vec<&str> = names.iter().copied().filter(|&n| n != "raypack").collect();
+        let compares = names.contains(&"raypack");
+        let mut head: Vec<String> = ["rays", "threads"].map(String::from).into();
+        for name in &names {
+            head.extend([(*name).to_owned(), String::new()]);
+        }
+        if compares {
+            head.extend(rivals.iter().map(|rival| format!("raypack : {rival}")));
+        }
+        let mut lines = vec![head];
+        for (kind, threads) in self.races() {
+            let mut line = vec![kind.name().into(), threads.to_string()];
+            for name in &names {
+                let best = self.best(name, kind, threads);
+                line.push(best.map_or_else(|| "-".into(), |row| figure(row.mrays_per_s)));
+                line.push(best.map_or_else(String::new, |row| row.mode.clone()));
+            }
+            if let Some(ours) = self.best("raypack", kind, threads).filter(|_| compares) {
+                for rival in &rivals {
+                    let ratio = self.best(rival, kind, threads).map(|row| ours.mrays_per_s / row.mrays_per_s);
+                    line.push(ratio.map_or_else(|| "-".into(), verdict));
+                }
+            }
+            lines.push(line);
+        }
+        lines
+    }
+
+    fn modes(&self) -> Vec<Vec<String>> {
+        let head =
+            ["rays", "threads", "engine", "mode", "Mrays/s", "low", "high", "hits", "of", "build s", "MiB"];
+        let mut lines = vec![head.map(String::from).to_vec()];
+        for (kind, threads) in self.races() {
+            let of_race = self.rows.iter().filter(|r| r.rays == kind && r.threads == threads);
+            lines.extend(of_race.map(|r: &Row| {
+                vec![
+                    kind.name().into(),
+                    threads.to_string(),
+                    r.engine.into(),
+                    r.mode.clone(),
+                    figure(r.mrays_per_s),
+                    figure(r.low),
+                    figure(r.high),
+                    r.hits.to_string(),
+                    r.count.to_string(),
+                    format!("{:.2}", r.build_seconds),
+                    format!("{:.1}", r.bytes as f64 / (1 << 20) as f64),
+                ]
+            }));
+        }
+        lines
+    }
+
+    fn agreement_lines(&self) -> Vec<Vec<String>> {
+        let head = ["rays", "one", "other", "disagree", "of", "per million"];
+        let line = |a: &super::Agreement| {
+            let (count, per_million) = (a.count.to_string(), format!("{:.1}", a.per_million));
+            let name = a.rays.name().into();
+            vec![name, a.first.clone(), a.second.clone(), a.disagreements.to_string(), count, per_million]
+        };
+        std::iter::once(head.map(String::from).to_vec()).chain(self.agreements.iter().map(line)).collect()
+    }
+}
+
+/// Three digits that matter.
+fn figure(mrays: f64) -> String {
+    match mrays {
+        m if m >= 100.0 => format!("{m:.0}"),
+        m if m >= 10.0 => format!("{m:.1}"),
+        m => format!("{m:.2}"),
+    }
+}
+
+/// A ratio and what it means for us.
+fn verdict(ratio: f64) -> String {
+    format!("{ratio:.2} {}", if ratio >= 1.0 { "won" } else { "lost" })
+}
+
+/// Columns as wide as their widest cell; numbers to the right.
+fn grid(lines: &[Vec<String>]) -> String {
+    let columns = lines.first().map_or(0, Vec::len);
+    let width = |c: usize| lines.iter().filter_map(|l| l.get(c)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..columns).map(|c| width(c).unwrap_or(0)).collect();
+    let mut text = String::new();
+    for (i, line) in lines.iter().enumerate() {
+        let mut row = String::new();
+        for (c, (cell, &width)) in line.iter().zip(&widths).enumerate() {
+            // A heading stands as its column's cells do.
+            let sample = if i == 0 { lines.get(1).and_then(|l| l.get(c)).unwrap_or(cell) } else { cell };
+            let number = sample == "-" || sample.parse::<f64>().is_ok();
+            let gap = if c == 0 { "" } else { "  " };
+            let written =
+                if number { write!(row, "{gap}{cell:>width$}") } else { write!(row, "{gap}{cell:<width$}") };
+            written.expect("writing to a string cannot fail");
+        }
+        text += row.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grids_align() {
+        let lines = [["a", "n", "x"], ["long", "12.5", "y"], ["b", "3", ""]];
+        let lines: Vec<Vec<String>> = lines.iter().map(|l| l.map(String::from).to_vec()).collect();
+        assert_eq!(grid(&lines), "a        n  x\nlong  12.5  y\nb        3\n");
+    }
+
+    #[test]
+    fn a_loss_is_called_one() {
+        assert_eq!(verdict(0.5), "0.50 lost");
+        assert_eq!(verdict(1.25), "1.25 won");
+        assert_eq!([figure(123.4), figure(12.34), figure(1.234)], ["123", "12.3", "1.23"]);
+    }
+}
