@@ -1,0 +1,100 @@
+//! `raypack bench` end to end: what its reports hold, and what it says of bad options.
+
+#![cfg(all(feature = "cli", feature = "peers"))]
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// A folder with a model of two walls at right angles and a floor.
+fn model() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("corner.obj");
+    let text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nv 4 0 4\nv 4 4 0\nv 0 4 4\n\
+                f 1 2 6 3\nf 1 4 5 2\nf 1 3 7 4\n";
+    fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn bench(model: &PathBuf) -> Command {
+    let mut command = Command::cargo_bin("raypack").unwrap();
+    command.arg("bench").arg(model).env_remove("RAYPACK_EMBREE").env_remove("RAYPACK_ISA");
+    command.args(["--size", "32", "--rounds", "3", "--seconds", "0"]);
+    command.args(["--camera", "eye=9,8,7;at=1,1,1;fov=50"]);
+    command
+}
+
+#[test]
+fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
+    let (folder, model) = model();
+    let file = folder.path().join("report.json");
+    let run = bench(&model)
+        .args(["--engines", "raypack,obvhs", "--threads", "2", "--all-modes"])
+        .arg("--json")
+        .arg(&file)
+        .assert();
+    run.success().stdout(predicate::str::contains("raypack : obvhs"));
+    let report: Value = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    assert_eq!(report["header"]["triangles"], 6);
+    let rows = report["rows"].as_array().unwrap();
+    for rays in ["camera", "shadow", "diffuse", "ao", "random"] {
+        for threads in [1, 2] {
+            let of = |engine: &str| {
+                let matches =
+                    |r: &&Value| r["engine"] == engine && r["rays"] == rays && r["threads"] == threads;
+                rows.iter().filter(matches).count()
+            };
+            assert_eq!((of("raypack"), of("obvhs")), (4, 4), "{rays}, {threads} threads");
+        }
+    }
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} of {row}"));
+        assert!(0.0 < number("low") && number("low") <= number("mrays_per_s"), "{row}");
+        assert!(number("mrays_per_s") <= number("high") && number("hits") <= number("count"), "{row}");
+        assert!(row["mode"].is_string() && row["isa"].is_string() && number("bytes") > 0.0, "{row}");
+    }
+    for agreement in report["agreements"].as_array().unwrap() {
+        assert_eq!(agreement["disagreements"], 0, "{agreement}");
+    }
+}
+
+#[test]
+fn json_on_standard_output_is_nothing_but_json() {
+    let (_folder, model) = model();
+    let run = bench(&model)
+        .args(["--engines", "raypack", "--rays", "camera", "--threads", "1", "--json", "-"])
+        .assert();
+    let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
+    assert_eq!(report["rows"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn bad_options_are_one_line_and_leave_no_report() {
+    let (folder, model) = model();
+    let file = folder.path().join("report.json");
+    for (option, value, said) in [
+        ("--engines", "raypack,optix", "--engines"),
+        ("--rays", "camera,primary", "--rays"),
+        ("--size", "32x16", "--size"),
+        ("--camera", "eye=1", "--camera"),
+        ("--profile", "no-such-profile", "no-such-profile"),
+    ] {
+        let mut command = Command::cargo_bin("raypack").unwrap();
+        let run = command.arg("bench").arg(&model).args([option, value]).arg("--json").arg(&file).assert();
+        run.failure()
+            .code(1)
+            .stderr(predicate::str::contains(said).and(predicate::str::is_match("^[^\n]+\n$").unwrap()));
+        assert!(!file.exists());
+    }
+}
+
+#[test]
+fn an_embree_that_is_not_where_it_is_said_to_be_is_an_error() {
+    let (folder, model) = model();
+    let run =
+        bench(&model).env("RAYPACK_EMBREE", folder.path()).args(["--engines", "raypack,embree"]).assert();
+    run.failure().code(1).stderr(predicate::str::contains("RAYPACK_EMBREE"));
+}
