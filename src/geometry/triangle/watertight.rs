@@ -10,10 +10,18 @@
 //! rounding is monotone and the products are rounded alike; where it is zero, double precision
 //! (in which products of two floats are exact) decides. That is why nothing here is fused.
 //!
+//! **Distance.** The paper weights the corners' depths with the edge functions, whose errors grow
+//! with the triangle: on an 800 m floor `t` is off by a tenth of a millimetre wherever the ray
+//! starts, and the weights of a sliver are mostly noise. Here `t` is where the ray meets the
+//! triangle's plane, with a normal from double precision (computed only for the few triangles that
+//! some lane is inside of). Its error is some ulps of the first corner's distance, whatever the
+//! triangle's shape. What the paper's form does guarantee, a `t` between the corners' depths, is
+//! kept by clamping: it also decides for triangles seen so nearly edge-on that the plane does not.
+//!
 //! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
 //! it would only turn all three signs round.
 
-use super::Corners;
+use super::{Corners, normal_in_double};
 use crate::simd::{Lanes, Mask};
 
 /// Which coordinates become x, y and z when an axis becomes z: a cyclic renaming.
@@ -32,6 +40,8 @@ pub struct Shear<const W: usize, L: Lanes<W>> {
     major_y: L::Mask,
     /// Origins in renamed coordinates: the third is along the greatest axis.
     origin: Lanes3<L>,
+    /// Directions in renamed coordinates.
+    direction: Lanes3<L>,
     /// `(dx/dz, dy/dz, 1/dz)` in renamed coordinates.
     shear: Lanes3<L>,
 }
@@ -69,10 +79,11 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         } else {
             None
         };
-        let mut frame = Self { major, major_x, major_y, origin: *origin, shear: *direction };
-        let [ox, oy, oz] = frame.renamed(origin);
-        let [dx, dy, dz] = frame.renamed(direction);
-        frame.origin = [ox, oy, oz];
+        let mut frame =
+            Self { major, major_x, major_y, origin: *origin, direction: *direction, shear: *direction };
+        frame.origin = frame.renamed(origin);
+        frame.direction = frame.renamed(direction);
+        let [dx, dy, dz] = frame.direction;
         frame.shear = [dx / dz, dy / dz, L::splat(1.0) / dz];
         frame
     }
@@ -89,16 +100,22 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         L::select(self.major_x, if_x, L::select(self.major_y, if_y, if_z))
     }
 
+    /// The same point or vector in every lane, with its coordinates renamed.
+    #[inline(always)]
+    fn splat_renamed(&self, point: &[f32; 3]) -> Lanes3<L> {
+        match self.major {
+            Some(axis) => {
+                let [i, j, k] = RENAMED[axis];
+                [L::splat(point[i]), L::splat(point[j]), L::splat(point[k])]
+            }
+            None => self.renamed(&[L::splat(point[0]), L::splat(point[1]), L::splat(point[2])]),
+        }
+    }
+
     /// A corner relative to the origins, with its coordinates renamed.
     #[inline(always)]
     fn translated(&self, corner: &[f32; 3]) -> Lanes3<L> {
-        let [x, y, z] = match self.major {
-            Some(axis) => {
-                let [i, j, k] = RENAMED[axis];
-                [L::splat(corner[i]), L::splat(corner[j]), L::splat(corner[k])]
-            }
-            None => self.renamed(&[L::splat(corner[0]), L::splat(corner[1]), L::splat(corner[2])]),
-        };
+        let [x, y, z] = self.splat_renamed(corner);
         [x - self.origin[0], y - self.origin[1], z - self.origin[2]]
     }
 
@@ -142,11 +159,26 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         let sum = a + b + c;
         inside = inside & (sum.lt(zero) | zero.lt(sum));
 
-        // Distance: the corners' depths, weighted.
+        // Distance: where the ray meets the plane, but between the corners' depths.
+        let [nx, ny, nz] = self.splat_renamed(&plane_normal(corners));
+        let [px, py, pz] = self.translated(&corners[0]);
+        let [dx, dy, dz] = self.direction;
+        let t = (nx * px + ny * py + nz * pz) / (nx * dx + ny * dy + nz * dz);
+        let (az, bz, cz) = (sz * az, sz * bz, sz * cz);
+        let (nearest, farthest) = (az.min(bz).min(cz), az.max(bz).max(cz));
+        let t = t.max(nearest).min(farthest);
+
         let inverse = L::splat(1.0) / sum;
-        let t = (a * (sz * az) + b * (sz * bz) + c * (sz * cz)) * inverse;
         Candidate { inside, t, u: b * inverse, v: c * inverse }
     }
+}
+
+/// A normal whose greatest component is 1, right to the last bits whatever the triangle's shape
+/// and size; NaNs for a triangle without area.
+#[inline(always)]
+fn plane_normal(corners: &Corners) -> [f32; 3] {
+    let n = normal_in_double(corners);
+    (n / n.abs().max_element()).as_vec3().to_array()
 }
 
 /// The edge functions of the lanes in `lanes`, computed in double precision; those of the other

@@ -14,7 +14,7 @@ use std::path::Path;
 ///
 /// # Errors
 ///
-/// [`Error::Write`].
+/// [`Error::Write`](crate::Error::Write).
 pub fn write(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     files::write_whole(path.as_ref(), |out| {
         header(mesh, out)?;
