@@ -58,7 +58,13 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     // tempfile puts its own path into the message; which file was asked for is in ours.
-    builder.tempfile_in(folder).map_err(|error| error.kind().into())
+    builder.tempfile_in(folder).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => io::Error::new(
+            ErrorKind::NotFound,
+            format!("there is no folder {}; make it first", folder.display()),
+        ),
+        kind => kind.into(),
+    })
 }
 
 /// The same as [`write_whole`] for text.
@@ -99,6 +105,7 @@ mod tests {
         check_writable(&folder.path().join("a.png")).expect("writable");
         assert!(names(folder.path()).is_empty());
         check_writable(folder.path()).expect_err("it is a folder");
-        check_writable(&folder.path().join("no/a.png")).expect_err("there is no such folder");
+        let error = check_writable(&folder.path().join("no/a.png")).expect_err("there is no such folder");
+        assert!(error.to_string().contains("there is no folder"), "{error}");
     }
 }

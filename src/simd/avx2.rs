@@ -6,8 +6,7 @@
 //! `#[target_feature]` entries of `isa.rs`, which a [`super::Chosen`] reaches only after the
 //! machine has been asked. So wherever a method of these types runs, the machine has AVX2.
 
-use super::isa::Simd;
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Lanes, Mask, Simd};
 use super::pair::Pair;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};

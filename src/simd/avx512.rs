@@ -5,8 +5,7 @@
 //! the `#[target_feature]` entry that a [`super::Chosen`] reaches after the machine was asked.
 
 use super::avx2;
-use super::isa::Simd;
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Lanes, Mask, Simd};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 

@@ -1,6 +1,6 @@
 //! Which instruction sets there are, which this machine has, and how a kernel enters one.
 
-use super::lanes::Lanes;
+use super::lanes::Simd;
 use super::portable::Portable;
 use crate::error::{Error, Result};
 use std::fmt;
@@ -91,16 +91,6 @@ impl fmt::Display for Isa {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
-}
-
-/// The vector types of an instruction set.
-pub trait Simd {
-    /// Four floats.
-    type F4: Lanes<4>;
-    /// Eight floats.
-    type F8: Lanes<8>;
-    /// Sixteen floats.
-    type F16: Lanes<16>;
 }
 
 /// Work to be compiled for every instruction set and run on one of them.

@@ -63,3 +63,13 @@ pub trait Lanes<const W: usize>:
     /// Lane `i` becomes element `i`.
     fn ids_store(ids: Self::Ids) -> [i32; W];
 }
+
+/// The vector types of an instruction set.
+pub trait Simd {
+    /// Four floats.
+    type F4: Lanes<4>;
+    /// Eight floats.
+    type F8: Lanes<8>;
+    /// Sixteen floats.
+    type F16: Lanes<16>;
+}

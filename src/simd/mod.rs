@@ -22,8 +22,8 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod pair;
 
-pub use isa::{Chosen, Isa, Simd, Task};
-pub use lanes::{Lanes, Mask};
+pub use isa::{Chosen, Isa, Task};
+pub use lanes::{Lanes, Mask, Simd};
 
 #[cfg(test)]
 mod tests;

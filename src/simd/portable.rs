@@ -1,7 +1,6 @@
 //! The portable implementation, through `wide`: SSE2 on x86-64, NEON on AArch64, and so on.
 
-use super::isa::Simd;
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Lanes, Mask, Simd};
 use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
