@@ -205,3 +205,74 @@ fn to_f32_with_sign(x: f64) -> f32 {
     let rounded = x as f32;
     if rounded == 0.0 && x != 0.0 { f32::from_bits(1).copysign(x as f32) } else { rounded }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// One ray against one triangle: its `t`, or `None`.
+    fn shoot(origin: Vec3, direction: Vec3, corners: &[Vec3; 3]) -> Option<f32> {
+        let shear = Shear::<1, f32>::new(&origin.to_array(), &direction.to_array(), 1);
+        let found = shear.test(&corners.map(|corner| corner.to_array()));
+        found.inside.then_some(found.t)
+    }
+
+    /// Uniform in -1..1 (a Weyl sequence is random enough here).
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 0.0f64;
+        move || {
+            state = (state + 0.618_033_988_749_895).fract();
+            (state * 2.0 - 1.0) as f32
+        }
+    }
+
+    #[test]
+    fn nothing_passes_between_triangles_that_share_an_edge() {
+        let mut number = numbers();
+        let mut point = || Vec3::new(number(), number(), number());
+        for _ in 0..200_000 {
+            // A quadrilateral that opens toward the ray's origin, and a ray at its diagonal.
+            let (a, c, origin) = (point(), point(), point() * 3.0 + Vec3::Z * 10.0);
+            let across = (c - a).cross(Vec3::Z).normalize_or(Vec3::X);
+            let (b, d) = (a + across, a - across);
+            let aim = a + (c - a) * (0.1 + 0.8 * point().x.abs());
+            let hits = [[a, c, b], [c, a, d]].map(|triangle| shoot(origin, aim - origin, &triangle));
+            assert!(hits.iter().any(Option::is_some), "{origin} to {aim} slips between {a} and {c}");
+        }
+    }
+
+    #[test]
+    fn t_is_right_on_a_huge_floor() {
+        let floor =
+            [Vec3::new(-450.0, -0.1, -450.0), Vec3::new(450.0, -0.1, 500.0), Vec3::new(470.0, -0.1, -450.0)];
+        let mut number = numbers();
+        for _ in 0..10_000 {
+            let origin = Vec3::new(100.0 + 90.0 * number(), 0.05 * number(), -300.0 + 90.0 * number());
+            let direction = Vec3::new(number(), -0.2 - number().abs(), number());
+            let t = shoot(origin, direction, &floor).expect("it is below");
+            let expected = (f64::from(-0.1f32) - f64::from(origin.y)) / f64::from(direction.y);
+            assert!((f64::from(t) / expected - 1.0).abs() < 1e-6, "{t} is not {expected}");
+        }
+    }
+
+    #[test]
+    fn t_lies_between_the_corners_depths_for_slivers_too() {
+        let mut number = numbers();
+        let mut hits = 0;
+        for _ in 0..50_000 {
+            let (p, q) = (Vec3::new(number(), number(), number()), Vec3::new(number(), number(), number()));
+            let sliver = [p, q, q + Vec3::new(number(), number(), number()) * 1e-6];
+            let origin = Vec3::new(number(), number(), 4.0);
+            let direction = (p + q) * 0.5 - origin;
+            if let Some(t) = shoot(origin, direction, &sliver) {
+                hits += 1;
+                let depths = sliver.map(|corner| (corner.z - origin.z) / direction.z);
+                let (low, high) =
+                    (depths[0].min(depths[1]).min(depths[2]), depths[0].max(depths[1]).max(depths[2]));
+                assert!(t >= low * 0.999_999 && t <= high * 1.000_001, "{t} of {depths:?}");
+            }
+        }
+        assert!(hits > 1000, "{hits} hits");
+    }
+}
