@@ -136,13 +136,12 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, const ANY: bool>(
             };
             let enters_first = first_part.live().any();
             let enters_second = second_part.live().any();
-            if enters_first {
-                if enters_second {
-                    stack.push(Waiting { node: second, interval: second_part });
-                }
+            if enters_first && enters_second {
+                stack.push(Waiting { node: second, interval: second_part });
                 (node, interval) = (first, first_part);
             } else {
-                (node, interval) = (second, second_part);
+                // Where no lane enters one of the cells, the other's intervals are the parent's.
+                node = if enters_first { first } else { second };
             }
         }
 
