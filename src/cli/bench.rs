@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::profile::{self, Profile};
 use crate::scene::Camera;
 use crate::simd::Isa;
-use crate::study::bench::{EngineName, Options, Pace, run as bench};
+use crate::study::bench::{EngineName, Options, Pace, hardware_threads, run as bench};
 use crate::study::rays::RayKind;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -76,8 +76,7 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 fn options(args: &Args) -> Result<Options> {
-    let hardware = std::thread::available_parallelism().map_or(1, usize::from);
-    let most = if args.threads == 0 { hardware } else { args.threads };
+    let most = if args.threads == 0 { hardware_threads() } else { args.threads };
     if most > 4096 {
         return Err(Error::option("--threads", format!("{most} is more than 4096")));
     }

@@ -117,7 +117,7 @@ fn memory(mesh: &Mesh, tree: &TreeStats) -> Memory {
         tree_triangles: tree.triangle_bytes,
         total: 0,
     };
-    memory.total = mesh.bytes() + memory.tree_nodes + memory.tree_references + memory.tree_triangles;
+    memory.total = mesh.bytes() + tree.bytes();
     memory
 }
 

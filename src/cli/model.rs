@@ -126,7 +126,7 @@ impl Scene {
                 tree.references_per_triangle,
                 tree.depth,
                 tree.sah_cost,
-                bytes((tree.node_bytes + tree.reference_bytes + tree.triangle_bytes) as u64),
+                bytes(tree.bytes() as u64),
                 tree.bytes_per_triangle,
             ),
         );

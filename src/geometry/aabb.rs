@@ -67,6 +67,15 @@ impl Aabb {
         2.0 * (e.x * e.y + e.y * e.z + e.z * e.x)
     }
 
+    /// The parts below and above a plane across an axis, which must lie inside or on a face.
+    #[inline]
+    pub fn halves(&self, axis: usize, position: f32) -> [Self; 2] {
+        let (mut below, mut above) = (*self, *self);
+        below.max[axis] = position;
+        above.min[axis] = position;
+        [below, above]
+    }
+
     /// Whether `point` lies inside or on a face.
     #[inline]
     pub fn contains(&self, point: Vec3) -> bool {

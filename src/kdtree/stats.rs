@@ -46,6 +46,13 @@ pub struct TreeStats {
     pub bytes_per_triangle: f64,
 }
 
+impl TreeStats {
+    /// All memory of the tree.
+    pub fn bytes(&self) -> usize {
+        self.node_bytes + self.reference_bytes + self.triangle_bytes
+    }
+}
+
 /// Leaf sizes that get a histogram entry of their own.
 const HISTOGRAM: usize = 32;
 
@@ -79,9 +86,7 @@ impl KdTree {
             } else {
                 stats.expected_steps += probability(&cell);
                 let [below, above] = self.children(node);
-                let (mut low, mut high) = (cell, cell);
-                low.max[node.axis()] = node.split();
-                high.min[node.axis()] = node.split();
+                let [low, high] = cell.halves(node.axis(), node.split());
                 stack.push((above, high, depth + 1));
                 stack.push((below, low, depth + 1));
             }
@@ -93,8 +98,7 @@ impl KdTree {
             stats.references as f64 / (stats.leaves - stats.empty_leaves).max(1) as f64;
         stats.sah_cost = f64::from(self.params.traversal_cost) * stats.expected_steps
             + f64::from(self.params.intersection_cost) * stats.expected_tests;
-        stats.bytes_per_triangle =
-            (stats.node_bytes + stats.reference_bytes + stats.triangle_bytes) as f64 / triangles;
+        stats.bytes_per_triangle = stats.bytes() as f64 / triangles;
         stats
     }
 }

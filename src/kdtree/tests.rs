@@ -5,10 +5,10 @@ use crate::mesh::Colors;
 use glam::Vec3;
 
 /// A generator of numbers for tests (SplitMix64).
-pub(crate) struct Numbers(pub u64);
+struct Numbers(pub u64);
 
 impl Numbers {
-    pub(crate) fn next(&mut self) -> u64 {
+    fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -17,11 +17,11 @@ impl Numbers {
     }
 
     /// Uniform in 0..1.
-    pub(crate) fn unit(&mut self) -> f32 {
+    fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1 << 24) as f32
     }
 
-    pub(crate) fn point(&mut self) -> Vec3 {
+    fn point(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit())
     }
 }
@@ -32,7 +32,7 @@ fn mesh_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
     Mesh { positions, triangles, colors: Colors::default() }
 }
 
-pub(crate) fn soup(count: usize, size: f32, seed: u64) -> Mesh {
+fn soup(count: usize, size: f32, seed: u64) -> Mesh {
     let mut numbers = Numbers(seed);
     mesh_of((0..count).map(|_| {
         let at = numbers.point() * 10.0;

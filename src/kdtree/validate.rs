@@ -66,7 +66,7 @@ impl KdTree {
             if !(cell.min[axis] <= split && split <= cell.max[axis]) {
                 return Err(format!("the plane {split} of the parent of {below} lies outside of its cell"));
             }
-            let [low, high] = halves(&cell, node);
+            let [low, high] = cell.halves(axis, split);
             stack.push((self.nodes[below], low, depth + 1));
             stack.push((self.nodes[below + 1], high, depth + 1));
         }
@@ -85,7 +85,7 @@ impl KdTree {
         let (axis, split) = (node.axis(), f64::from(node.split()));
         let (low, high) = piece.certain_range(axis);
         let [below, above] = self.children(node);
-        let [cell_below, cell_above] = halves(cell, node);
+        let [cell_below, cell_above] = cell.halves(axis, node.split());
         let go = |child: Node, cell: &Aabb, is_below: bool| {
             let mut part = piece.clone();
             part.clip(axis, node.split(), is_below);
@@ -109,12 +109,4 @@ fn only_touches(piece: &Polygon, extended: [bool; 3], cell: &Aabb) -> bool {
         let (low, high) = piece.certain_range(axis);
         extended[axis] && (low >= f64::from(cell.max[axis]) || high <= f64::from(cell.min[axis]))
     })
-}
-
-/// The cells of an inner node's children: below its plane, and above.
-fn halves(cell: &Aabb, node: Node) -> [Aabb; 2] {
-    let (mut low, mut high) = (*cell, *cell);
-    low.max[node.axis()] = node.split();
-    high.min[node.axis()] = node.split();
-    [low, high]
 }

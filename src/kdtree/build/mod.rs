@@ -232,19 +232,14 @@ fn divide(
         return None;
     }
 
-    let child = |references: Vec<Reference>, below: bool| {
-        let mut cell = place.cell;
-        if below {
-            cell.max[split.axis] = split.position;
-        } else {
-            cell.min[split.axis] = split.position;
-        }
+    let child = |references: Vec<Reference>, cell: Aabb| {
         let part = references.len() as f64 / total.max(1) as f64;
         let budget = (place.budget as f64 * part) as usize;
         let place = Place { cell, depth: place.depth + 1, bad_splits, budget, share: place.share * part };
         Child { references, place }
     };
-    Some((split, [child(parts.below, true), child(parts.above, false)]))
+    let [below, above] = place.cell.halves(split.axis, split.position);
+    Some((split, [child(parts.below, below), child(parts.above, above)]))
 }
 
 impl Context<'_> {

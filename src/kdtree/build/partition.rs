@@ -30,12 +30,9 @@ pub(super) fn partition(references: &[Reference], triangles: &[Corners], split: 
             above.push(*reference);
         } else {
             let corners = &triangles[reference.primitive as usize];
-            let mut part = reference.bounds();
-            part.max[axis] = position;
-            let clipped_below = clipped_bounds(corners, &part);
-            part = reference.bounds();
-            part.min[axis] = position;
-            let clipped_above = clipped_bounds(corners, &part);
+            let [part_below, part_above] = reference.bounds().halves(axis, position);
+            let clipped_below = clipped_bounds(corners, &part_below);
+            let clipped_above = clipped_bounds(corners, &part_above);
             // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
             if clipped_below.is_none() && clipped_above.is_none() {
                 below.push(*reference);

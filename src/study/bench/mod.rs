@@ -31,6 +31,7 @@ mod table;
 
 pub use agreement::Agreement;
 pub use engine::Results;
+pub use machine::hardware_threads;
 pub use race::Pace;
 pub use report::{EngineInfo, Header, Report, Row};
 

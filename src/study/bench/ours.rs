@@ -29,8 +29,7 @@ impl Ours {
         let start = Instant::now();
         let accel = Accel::build(mesh, params)?.with_isa(isa);
         let build_seconds = start.elapsed().as_secs_f64();
-        let stats = accel.stats();
-        let bytes = (stats.node_bytes + stats.reference_bytes + stats.triangle_bytes) as u64;
+        let bytes = accel.stats().bytes() as u64;
         Ok(Self { accel, build_seconds, bytes })
     }
 
