@@ -11,3 +11,4 @@ pub mod triangle;
 pub use aabb::Aabb;
 pub use hit::{Hit, NO_PRIMITIVE};
 pub use ray::Ray;
+pub use triangle::Accuracy;

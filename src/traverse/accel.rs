@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::packet;
 use crate::error::Result;
-use crate::geometry::{Aabb, Hit, Ray};
+use crate::geometry::{Aabb, Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, BuildProgress, KdTree, Tree, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa, Simd, Task};
@@ -16,6 +16,7 @@ use crate::simd::{Chosen, Isa, Simd, Task};
 pub struct Accel {
     tree: KdTree,
     chosen: Chosen,
+    accuracy: Accuracy,
 }
 
 impl Accel {
@@ -37,7 +38,7 @@ impl Accel {
 
     /// Wraps a tree, to be traced with the best instruction set that the machine has.
     pub fn of_tree(tree: KdTree) -> Self {
-        Self { tree, chosen: Chosen::best() }
+        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default() }
     }
 
     /// The same, traced with another instruction set. Panics if this machine lacks it.
@@ -54,6 +55,22 @@ impl Accel {
     /// The instruction set in use.
     pub fn isa(&self) -> Isa {
         self.chosen.isa()
+    }
+
+    /// The same, traced with another accuracy.
+    pub fn with_accuracy(mut self, accuracy: Accuracy) -> Self {
+        self.set_accuracy(accuracy);
+        self
+    }
+
+    /// Chooses the accuracy.
+    pub fn set_accuracy(&mut self, accuracy: Accuracy) {
+        self.accuracy = accuracy;
+    }
+
+    /// The accuracy in use.
+    pub fn accuracy(&self) -> Accuracy {
+        self.accuracy
     }
 
     /// The tree.

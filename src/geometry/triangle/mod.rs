@@ -1,6 +1,9 @@
 //! Ray against triangle: one file per test.
 
+mod accuracy;
 pub mod watertight;
+
+pub use accuracy::Accuracy;
 
 use glam::{DVec3, Vec3};
 
