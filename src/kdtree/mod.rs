@@ -63,6 +63,12 @@ impl KdTree {
         Ok(Self { nodes, references, triangles, bounds, params: params.clone() })
     }
 
+    /// The corners of all triangles, by primitive id.
+    #[inline(always)]
+    pub fn triangles(&self) -> &[Corners] {
+        &self.triangles
+    }
+
     /// The settings that it was built with.
     pub fn params(&self) -> &BuildParams {
         &self.params

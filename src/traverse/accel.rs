@@ -4,10 +4,13 @@ use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::packet;
 use crate::error::Result;
+use crate::geometry::triangle::fast::Projected;
+use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
 use crate::geometry::{Aabb, Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, BuildProgress, KdTree, Tree, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa, Simd, Task};
+use rayon::prelude::*;
 
 /// A mesh made ready for tracing: its tree, and the instruction set to trace with.
 ///
@@ -17,6 +20,8 @@ pub struct Accel {
     tree: KdTree,
     chosen: Chosen,
     accuracy: Accuracy,
+    /// The fast test's records, empty until that mode is chosen.
+    projected: Vec<Projected>,
 }
 
 impl Accel {
@@ -38,7 +43,7 @@ impl Accel {
 
     /// Wraps a tree, to be traced with the best instruction set that the machine has.
     pub fn of_tree(tree: KdTree) -> Self {
-        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default() }
+        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default(), projected: Vec::new() }
     }
 
     /// The same, traced with another instruction set. Panics if this machine lacks it.
@@ -63,8 +68,12 @@ impl Accel {
         self
     }
 
-    /// Chooses the accuracy.
+    /// Chooses the accuracy. The first choice of [`Accuracy::Fast`] makes that test's records, 40
+    /// bytes a triangle, which stay.
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
+        if accuracy == Accuracy::Fast && self.projected.is_empty() {
+            self.projected = self.tree.triangles().par_iter().map(Projected::new).collect();
+        }
         self.accuracy = accuracy;
     }
 
@@ -104,7 +113,21 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        self.chosen.run(IntersectPacket { tree: &self.tree, rays, active: active & lanes_of(W) })
+        let (tree, active) = (&self.tree, active & lanes_of(W));
+        match self.accuracy {
+            Accuracy::Fast => {
+                self.chosen.run(IntersectPacket::<W, Fast> { tree, records: &self.projected, rays, active })
+            }
+            Accuracy::Watertight => self.chosen.run(IntersectPacket::<W, Watertight> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+            }),
+            Accuracy::Exact => {
+                self.chosen.run(IntersectPacket::<W, Exact> { tree, records: tree.triangles(), rays, active })
+            }
+        }
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies.
@@ -113,7 +136,21 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        self.chosen.run(OccludedPacket { tree: &self.tree, rays, active: active & lanes_of(W) })
+        let (tree, active) = (&self.tree, active & lanes_of(W));
+        match self.accuracy {
+            Accuracy::Fast => {
+                self.chosen.run(OccludedPacket::<W, Fast> { tree, records: &self.projected, rays, active })
+            }
+            Accuracy::Watertight => self.chosen.run(OccludedPacket::<W, Watertight> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+            }),
+            Accuracy::Exact => {
+                self.chosen.run(OccludedPacket::<W, Exact> { tree, records: tree.triangles(), rays, active })
+            }
+        }
     }
 
     /// The closest hit of each ray, by the kernel named: for packets, rays that follow one
@@ -170,13 +207,14 @@ const fn lanes_of(count: usize) -> u32 {
     (1 << count) - 1
 }
 
-struct IntersectPacket<'a, const W: usize> {
+struct IntersectPacket<'a, const W: usize, M: Mode> {
     tree: &'a KdTree,
+    records: &'a [M::Record],
     rays: &'a RayPacket<W>,
     active: u32,
 }
 
-impl<const W: usize> Task for IntersectPacket<'_, W>
+impl<const W: usize, M: Mode> Task for IntersectPacket<'_, W, M>
 where
     RayPacket<W>: PacketWidth<W>,
 {
@@ -184,21 +222,23 @@ where
 
     #[inline(always)]
     fn run<S: Simd>(self) -> HitPacket<W> {
-        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _>(
+        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(
             self.tree,
+            self.records,
             self.rays,
             self.active,
         )
     }
 }
 
-struct OccludedPacket<'a, const W: usize> {
+struct OccludedPacket<'a, const W: usize, M: Mode> {
     tree: &'a KdTree,
+    records: &'a [M::Record],
     rays: &'a RayPacket<W>,
     active: u32,
 }
 
-impl<const W: usize> Task for OccludedPacket<'_, W>
+impl<const W: usize, M: Mode> Task for OccludedPacket<'_, W, M>
 where
     RayPacket<W>: PacketWidth<W>,
 {
@@ -206,8 +246,9 @@ where
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
-        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _>(
+        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(
             self.tree,
+            self.records,
             self.rays,
             self.active,
         )

@@ -13,7 +13,7 @@
 use super::lanes::{HitPacket, RayPacket};
 use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::NO_PRIMITIVE;
-use crate::geometry::triangle::{self, watertight::Shear};
+use crate::geometry::triangle::{self, Mode, Test};
 use crate::kdtree::{MAX_DEPTH, Node, Tree};
 use crate::simd::{Lanes, Mask};
 use std::mem::MaybeUninit;
@@ -63,14 +63,15 @@ impl<L: Copy> Stack<L> {
     }
 }
 
-/// The closest hit of every lane in `active`.
+/// The closest hit of every lane in `active`. `records` holds what the mode keeps of each triangle.
 #[inline(always)]
-pub fn intersect<const W: usize, L: Lanes<W>, T: Tree>(
+pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
     tree: &T,
+    records: &[M::Record],
     rays: &RayPacket<W>,
     active: u32,
 ) -> HitPacket<W> {
-    let closest = walk::<W, L, T, false>(tree, rays, active);
+    let closest = walk::<W, L, T, M, false>(tree, records, rays, active);
     let primitive = L::ids_store(closest.primitive);
     let (t, u, v) = (closest.t.store(), closest.u.store(), closest.v.store());
     let mut hits = HitPacket::miss();
@@ -78,7 +79,9 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree>(
         if primitive[lane] != NONE {
             let id = primitive[lane] as u32;
             let normal = triangle::normal(tree.corners(id));
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t[lane], u[lane], v[lane]);
+            let record = &records[id as usize];
+            hits.t[lane] = t[lane];
+            [hits.u[lane], hits.v[lane]] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
             hits.primitive[lane] = id;
             for axis in 0..3 {
                 hits.normal[axis][lane] = normal[axis];
@@ -90,15 +93,21 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree>(
 
 /// The lanes in `active` that hit anything.
 #[inline(always)]
-pub fn occluded<const W: usize, L: Lanes<W>, T: Tree>(tree: &T, rays: &RayPacket<W>, active: u32) -> u32 {
-    let found = walk::<W, L, T, true>(tree, rays, active);
+pub fn occluded<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &RayPacket<W>,
+    active: u32,
+) -> u32 {
+    let found = walk::<W, L, T, M, true>(tree, records, rays, active);
     !L::ids_less(L::ids(NONE - 1), found.primitive).bits() & active
 }
 
 /// Walks the tree; with `ANY`, a lane is done at its first hit.
 #[inline(always)]
-fn walk<const W: usize, L: Lanes<W>, T: Tree, const ANY: bool>(
+fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
     tree: &T,
+    records: &[M::Record],
     rays: &RayPacket<W>,
     active: u32,
 ) -> Closest<W, L> {
@@ -110,7 +119,7 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, const ANY: bool>(
     if live == 0 {
         return closest;
     }
-    let shear = Shear::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
+    let test = M::Test::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
     let tnear = L::load(&rays.tnear);
 
     let mut node = tree.root();
@@ -150,7 +159,7 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, const ANY: bool>(
         if !primitives.is_empty() {
             let live = interval.live();
             for &primitive in primitives {
-                let candidate = shear.test(tree.corners(primitive));
+                let candidate = test.test(&records[primitive as usize], live);
                 let mut hit = candidate.inside & live;
                 if !hit.any() {
                     continue;

@@ -1,19 +1,30 @@
 //! Tracing without a tree.
 
 use glam::DVec3;
-use raypack::geometry::triangle::{normal, watertight::Shear};
-use raypack::geometry::{Aabb, Hit, NO_PRIMITIVE, Ray};
+use raypack::geometry::triangle::fast::Projected;
+use raypack::geometry::triangle::{Exact, Fast, Mode, Test, Watertight, normal};
+use raypack::geometry::{Aabb, Accuracy, Hit, NO_PRIMITIVE, Ray};
 use raypack::mesh::Mesh;
 
 /// The closest hit by the library's own triangle test, lowest id first among equals.
-pub fn same_test(mesh: &Mesh, ray: &Ray) -> Hit {
-    let shear = Shear::<1, f32>::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+pub fn same_test(mesh: &Mesh, ray: &Ray, accuracy: Accuracy) -> Hit {
+    match accuracy {
+        Accuracy::Fast => by_test::<Fast>(mesh, ray, Projected::new),
+        Accuracy::Watertight => by_test::<Watertight>(mesh, ray, |&corners| corners),
+        Accuracy::Exact => by_test::<Exact>(mesh, ray, |&corners| corners),
+    }
+}
+
+fn by_test<M: Mode>(mesh: &Mesh, ray: &Ray, record: impl Fn(&[[f32; 3]; 3]) -> M::Record) -> Hit {
+    let test = M::Test::<1, f32>::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
     let mut best = Hit::MISS;
     for primitive in 0..mesh.triangles.len() as u32 {
         let corners = mesh.corners(primitive).map(|corner| corner.to_array());
-        let found = shear.test(&corners);
+        let record = record(&corners);
+        let found = test.test(&record, true);
         if found.inside && found.t >= ray.tnear && found.t <= ray.tfar && found.t < best.t {
-            best = Hit { t: found.t, u: found.u, v: found.v, primitive, normal: normal(&corners) };
+            let [u, v] = M::Test::<1, f32>::weights(&record, found.u, found.v);
+            best = Hit { t: found.t, u, v, primitive, normal: normal(&corners) };
         }
     }
     best

@@ -10,7 +10,7 @@ mod properties;
 mod scenes;
 
 use brute::{Double, Verdict};
-use raypack::geometry::{Hit, Ray};
+use raypack::geometry::{Accuracy, Hit, Ray};
 use raypack::kdtree::BuildParams;
 use raypack::mesh::Mesh;
 use raypack::simd::Isa;
@@ -20,8 +20,16 @@ use raypack::traverse::{Accel, Kernel};
 const RAYS: usize = 4000;
 
 /// Runs every kernel on every instruction set and compares its answers with the expected ones.
-fn check_kernels(name: &str, mesh: &Mesh, params: &BuildParams, rays: &[Ray], expected: &[Hit]) {
+fn check_kernels(
+    name: &str,
+    accuracy: Accuracy,
+    mesh: &Mesh,
+    params: &BuildParams,
+    rays: &[Ray],
+    expected: &[Hit],
+) {
     let mut accel = Accel::build(mesh, params).expect("builds");
+    accel.set_accuracy(accuracy);
     accel.tree().validate().unwrap_or_else(|fault| panic!("{name}: {fault}"));
     for isa in Isa::available() {
         accel.set_isa(isa);
@@ -34,7 +42,7 @@ fn check_kernels(name: &str, mesh: &Mesh, params: &BuildParams, rays: &[Ray], ex
                 let (got, want) = (hits[i], expected[i]);
                 assert!(
                     bits(&got) == bits(&want) && occluded[i] == want.is_hit(),
-                    "{name}, {kernel} on {isa}: {:?} gives {got:?} (occluded: {}), not {want:?}",
+                    "{name}, {accuracy} {kernel} on {isa}: {:?} gives {got:?} (occluded: {}), not {want:?}",
                     rays[i],
                     occluded[i]
                 );
@@ -53,13 +61,17 @@ fn bits(hit: &Hit) -> [u32; 7] {
 fn every_kernel_gives_what_the_test_gives_without_a_tree() {
     for (name, mesh) in scenes::all() {
         let rays = scenes::rays(&mesh, RAYS, 1);
-        let expected: Vec<Hit> = rays.iter().map(|ray| brute::same_test(&mesh, ray)).collect();
-        let hits = expected.iter().filter(|hit| hit.is_hit()).count();
-        assert!(hits * 20 > RAYS && hits < RAYS, "{name}: {hits} of {RAYS} rays hit: nothing to compare");
-        check_kernels(name, &mesh, &BuildParams::default(), &rays, &expected);
-        // A tree with the smallest leaves and the most planes has the most ways to lose a hit.
-        let deep = BuildParams { traversal_cost: 0.1, min_leaf: 1, exact_below: 64, ..Default::default() };
-        check_kernels(name, &mesh, &deep, &rays, &expected);
+        for accuracy in Accuracy::ALL {
+            let brute = |ray| brute::same_test(&mesh, ray, accuracy);
+            let expected: Vec<Hit> = rays.iter().map(brute).collect();
+            let hits = expected.iter().filter(|hit| hit.is_hit()).count();
+            assert!(hits * 20 > RAYS && hits < RAYS, "{name}: {hits} of {RAYS} rays hit: nothing to compare");
+            check_kernels(name, accuracy, &mesh, &BuildParams::default(), &rays, &expected);
+            // A tree with the smallest leaves and the most planes has the most ways to lose a hit.
+            let deep =
+                BuildParams { traversal_cost: 0.1, min_leaf: 1, exact_below: 64, ..Default::default() };
+            check_kernels(name, accuracy, &mesh, &deep, &rays, &expected);
+        }
     }
 }
 

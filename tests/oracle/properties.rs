@@ -5,7 +5,7 @@
 use crate::{brute, check_kernels};
 use proptest::prelude::*;
 use raypack::Vec3;
-use raypack::geometry::{Hit, Ray};
+use raypack::geometry::{Accuracy, Hit, Ray};
 use raypack::kdtree::BuildParams;
 use raypack::mesh::{Colors, Mesh};
 
@@ -34,9 +34,12 @@ fn rays(grid: bool) -> impl Strategy<Value = Vec<Ray>> {
 }
 
 fn same_everywhere(mesh: &Mesh, rays: &[Ray]) {
-    let expected: Vec<Hit> = rays.iter().map(|ray| brute::same_test(mesh, ray)).collect();
     let params = BuildParams { traversal_cost: 0.3, min_leaf: 1, ..Default::default() };
-    check_kernels("chance", mesh, &params, rays, &expected);
+    for accuracy in Accuracy::ALL {
+        let brute = |ray| brute::same_test(mesh, ray, accuracy);
+        let expected: Vec<Hit> = rays.iter().map(brute).collect();
+        check_kernels("chance", accuracy, mesh, &params, rays, &expected);
+    }
 }
 
 proptest! {

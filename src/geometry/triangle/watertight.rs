@@ -21,14 +21,8 @@
 //! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
 //! it would only turn all three signs round.
 
-use super::{Corners, normal_in_double};
+use super::{Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
 use crate::simd::{Lanes, Mask};
-
-/// Which coordinates become x, y and z when an axis becomes z: a cyclic renaming.
-const RENAMED: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
-/// Three coordinates, `W` lanes each.
-pub type Lanes3<L> = [L; 3];
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
 #[derive(Clone, Copy)]
@@ -46,48 +40,7 @@ pub struct Shear<const W: usize, L: Lanes<W>> {
     shear: Lanes3<L>,
 }
 
-/// Triangles that the lanes of a packet may have hit.
-pub struct Candidate<const W: usize, L: Lanes<W>> {
-    /// Lanes in which the line meets the triangle: `t` is not compared with anything yet.
-    pub inside: L::Mask,
-    /// The ray's parameter.
-    pub t: L,
-    /// Barycentric weight of the second corner.
-    pub u: L,
-    /// Barycentric weight of the third corner.
-    pub v: L,
-}
-
 impl<const W: usize, L: Lanes<W>> Shear<W, L> {
-    /// Prepares `W` rays. `active` has a bit for each lane that matters: the others do not keep
-    /// the fast path from being taken.
-    ///
-    /// A lane whose direction is zero or not finite gets a shear of NaNs, and so never a hit.
-    #[inline(always)]
-    pub fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {
-        let (x, y, z) = (direction[0].abs(), direction[1].abs(), direction[2].abs());
-        // Ties go to the earlier axis, so that every width picks alike.
-        let major_x = y.le(x) & z.le(x);
-        let major_y = !major_x & z.le(y);
-        let (bits_x, bits_y) = (major_x.bits() & active, major_y.bits() & active);
-        let major = if bits_x == active {
-            Some(0)
-        } else if bits_y == active {
-            Some(1)
-        } else if bits_x | bits_y == 0 {
-            Some(2)
-        } else {
-            None
-        };
-        let mut frame =
-            Self { major, major_x, major_y, origin: *origin, direction: *direction, shear: *direction };
-        frame.origin = frame.renamed(origin);
-        frame.direction = frame.renamed(direction);
-        let [dx, dy, dz] = frame.direction;
-        frame.shear = [dx / dz, dy / dz, L::splat(1.0) / dz];
-        frame
-    }
-
     /// Coordinates renamed lane by lane so that each lane's greatest axis comes last.
     #[inline(always)]
     fn renamed(&self, [x, y, z]: &Lanes3<L>) -> Lanes3<L> {
@@ -119,20 +72,74 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         [x - self.origin[0], y - self.origin[1], z - self.origin[2]]
     }
 
-    /// One triangle against all lanes. Edges and corners belong to the triangle; a triangle seen
-    /// exactly edge-on, or without area, is never hit. NaN corners are never hit.
+    /// The same with x and y sheared so that the rays run along z.
     #[inline(always)]
-    pub fn test(&self, corners: &Corners) -> Candidate<W, L> {
-        // Translate the corners to the origins, with their coordinates renamed.
-        let [ax, ay, az] = self.translated(&corners[0]);
-        let [bx, by, bz] = self.translated(&corners[1]);
-        let [cx, cy, cz] = self.translated(&corners[2]);
+    fn sheared(&self, corner: &[f32; 3]) -> Lanes3<L> {
+        let [x, y, z] = self.translated(corner);
+        let [sx, sy, _] = self.shear;
+        [x - sx * z, y - sy * z, z]
+    }
 
-        // Shear x and y so that the rays run along z.
-        let [sx, sy, sz] = self.shear;
-        let (ax, ay) = (ax - sx * az, ay - sy * az);
-        let (bx, by) = (bx - sx * bz, by - sy * bz);
-        let (cx, cy) = (cx - sx * cz, cy - sy * cz);
+    /// Lanes whose line cannot be shown to miss a triangle: all that hit it, and few others.
+    ///
+    /// With `u = 2^-24` and `far` the greatest translated coordinate, sheared ones are off by at
+    /// most `6u far`; so with `wide` the greatest sheared one, edge functions are off by at most
+    /// `36u far (wide + 2u far)`, and by some of the smallest floats where products underflow.
+    /// Where anything overflows, so does the bound, and the lane is likely.
+    #[inline(always)]
+    pub(super) fn likely(&self, corners: &Corners) -> L::Mask {
+        let [ax, ay, az] = self.sheared(&corners[0]);
+        let [bx, by, bz] = self.sheared(&corners[1]);
+        let [cx, cy, cz] = self.sheared(&corners[2]);
+        let a = cx * by - cy * bx;
+        let b = ax * cy - ay * cx;
+        let c = bx * ay - by * ax;
+
+        // Translated x and y are at most the sheared ones and z together.
+        let wide = ax.abs().max(ay.abs()).max(bx.abs()).max(by.abs()).max(cx.abs()).max(cy.abs());
+        let far = wide + az.abs().max(bz.abs()).max(cz.abs());
+        let tiny = L::splat(1e-43);
+        let error =
+            L::splat(1.0 / (1 << 18) as f32) * far * (wide + L::splat(1.0 / (1 << 20) as f32) * far) + tiny;
+        !(a.min(b).min(c).lt(L::splat(0.0) - error) & error.lt(a.max(b).max(c)))
+    }
+}
+
+impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
+    type Record = Corners;
+
+    /// Lanes that are not active do not keep the one renaming for all from being taken. A lane
+    /// whose direction is zero or not finite gets a shear of NaNs, and so never a hit.
+    #[inline(always)]
+    fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {
+        let (x, y, z) = (direction[0].abs(), direction[1].abs(), direction[2].abs());
+        // Ties go to the earlier axis, so that every width picks alike.
+        let major_x = y.le(x) & z.le(x);
+        let major_y = !major_x & z.le(y);
+        let (bits_x, bits_y) = (major_x.bits() & active, major_y.bits() & active);
+        let major = if bits_x == active {
+            Some(0)
+        } else if bits_y == active {
+            Some(1)
+        } else if bits_x | bits_y == 0 {
+            Some(2)
+        } else {
+            None
+        };
+        let mut frame =
+            Self { major, major_x, major_y, origin: *origin, direction: *direction, shear: *direction };
+        frame.origin = frame.renamed(origin);
+        frame.direction = frame.renamed(direction);
+        let [dx, dy, dz] = frame.direction;
+        frame.shear = [dx / dz, dy / dz, L::splat(1.0) / dz];
+        frame
+    }
+
+    #[inline(always)]
+    fn test(&self, corners: &Corners, lanes: L::Mask) -> Candidate<W, L> {
+        let [ax, ay, az] = self.sheared(&corners[0]);
+        let [bx, by, bz] = self.sheared(&corners[1]);
+        let [cx, cy, cz] = self.sheared(&corners[2]);
 
         // Edge functions: each is opposite to the corner whose weight it is.
         let mut a = cx * by - cy * bx;
@@ -141,9 +148,9 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
 
         // All of one sign, zeros allowed: not both a negative and a positive one.
         let zero = L::splat(0.0);
-        let mut inside = !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+        let mut inside = lanes & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
         if !inside.any() {
-            return Candidate { inside, t: zero, u: zero, v: zero };
+            return Candidate::none(inside);
         }
 
         // Where an edge function is zero, its sign is not known: ask double precision.
@@ -164,6 +171,7 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         let [px, py, pz] = self.translated(&corners[0]);
         let [dx, dy, dz] = self.direction;
         let t = (nx * px + ny * py + nz * pz) / (nx * dx + ny * dy + nz * dz);
+        let [_, _, sz] = self.shear;
         let (az, bz, cz) = (sz * az, sz * bz, sz * cz);
         let (nearest, farthest) = (az.min(bz).min(cz), az.max(bz).max(cz));
         let t = t.max(nearest).min(farthest);
@@ -214,7 +222,7 @@ mod tests {
     /// One ray against one triangle: its `t`, or `None`.
     fn shoot(origin: Vec3, direction: Vec3, corners: &[Vec3; 3]) -> Option<f32> {
         let shear = Shear::<1, f32>::new(&origin.to_array(), &direction.to_array(), 1);
-        let found = shear.test(&corners.map(|corner| corner.to_array()));
+        let found = shear.test(&corners.map(|corner| corner.to_array()), true);
         found.inside.then_some(found.t)
     }
 

@@ -1,0 +1,93 @@
+//! What every ray-triangle test is to a traversal kernel.
+
+use super::{Accuracy, Corners};
+use crate::simd::Lanes;
+
+/// Three coordinates, `W` lanes each.
+pub type Lanes3<L> = [L; 3];
+
+/// `W` rays prepared for being tested against triangles.
+///
+/// What a lane answers depends on that lane's ray and the triangle alone, not on the other lanes,
+/// the width or the instruction set: kernels that walk differently agree bit for bit.
+pub trait Test<const W: usize, L: Lanes<W>>: Sized {
+    /// What is kept of each triangle for this test.
+    type Record;
+
+    /// Prepares `W` rays. `active` has a bit for each lane that matters.
+    fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
+
+    /// One triangle against the lanes in `lanes`; what the others answer means nothing.
+    ///
+    /// Edges and corners belong to the triangle. A triangle seen exactly edge-on, or without area,
+    /// or with a NaN in it, is never hit.
+    fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
+
+    /// The barycentric weights `(u, v)` of the triangle's second and third corner, from those that
+    /// `test` gave: a record may hold the corners in another order.
+    #[inline(always)]
+    fn weights(_triangle: &Self::Record, u: f32, v: f32) -> [f32; 2] {
+        [u, v]
+    }
+}
+
+/// The lanes of a packet that may have hit a triangle.
+pub struct Candidate<const W: usize, L: Lanes<W>> {
+    /// Lanes in which the line meets the triangle: `t` is not compared with anything yet.
+    pub inside: L::Mask,
+    /// The ray's parameter.
+    pub t: L,
+    /// Barycentric weight of the record's second corner.
+    pub u: L,
+    /// Barycentric weight of the record's third corner.
+    pub v: L,
+}
+
+impl<const W: usize, L: Lanes<W>> Candidate<W, L> {
+    /// None in `inside`, whose lanes are all clear.
+    #[inline(always)]
+    pub(super) fn none(inside: L::Mask) -> Self {
+        let zero = L::splat(0.0);
+        Self { inside, t: zero, u: zero, v: zero }
+    }
+}
+
+/// A test for every width: what a kernel is compiled for.
+pub trait Mode {
+    /// Its name.
+    const ACCURACY: Accuracy;
+    /// What is kept of each triangle.
+    type Record: Send + Sync;
+    /// The test for `W` rays in lanes `L`.
+    type Test<const W: usize, L: Lanes<W>>: Test<W, L, Record = Self::Record>;
+}
+
+/// [`Accuracy::Fast`] as a type.
+#[derive(Clone, Copy, Debug)]
+pub struct Fast;
+
+/// [`Accuracy::Watertight`] as a type.
+#[derive(Clone, Copy, Debug)]
+pub struct Watertight;
+
+/// [`Accuracy::Exact`] as a type.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact;
+
+impl Mode for Fast {
+    const ACCURACY: Accuracy = Accuracy::Fast;
+    type Record = super::fast::Projected;
+    type Test<const W: usize, L: Lanes<W>> = super::fast::Lines<W, L>;
+}
+
+impl Mode for Watertight {
+    const ACCURACY: Accuracy = Accuracy::Watertight;
+    type Record = Corners;
+    type Test<const W: usize, L: Lanes<W>> = super::watertight::Shear<W, L>;
+}
+
+impl Mode for Exact {
+    const ACCURACY: Accuracy = Accuracy::Exact;
+    type Record = Corners;
+    type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
+}
