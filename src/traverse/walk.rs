@@ -1,13 +1,15 @@
 //! A packet's rays as the walk down the tree needs them: where they cross planes, and how sure
 //! that is.
 //!
-//! **Cells have thick walls.** The triangle test is exact for corners moved by a few ulps of
-//! their distance from the origin (each translated and sheared coordinate is rounded some four
-//! times), so a ray may hit a triangle that it passes at that distance, and that triangle may be
-//! listed only in a cell that the ray touches within it. Every plane is therefore taken to be a
-//! slab of half-thickness `margin = 2^-20 * reach`, where `reach` is the greatest coordinate
-//! distance from the origin to the bounds: some twice the test's error. It covers the rounding
-//! of the plane's own parameter too. Nothing here depends on the scale of the scene.
+//! **Cells have thick walls.** A triangle test answers for corners moved by a few roundings of
+//! their distance from the origin, and its `t` is rounded too: what it promises is that the point
+//! `origin + t * direction` of a hit lies within some 16 roundings of that distance of a point of
+//! the triangle. That triangle may be listed only in a cell that the ray touches within as much.
+//! Every plane is therefore taken to be a slab of half-thickness `margin = 2^-19 * reach`, 32
+//! roundings of `reach`, the greatest coordinate distance from the origin to the bounds. It covers
+//! the rounding of the plane's own parameter too. So each hit lies inside a cell that lists its
+//! triangle, and the order in which cells are looked at decides nothing. Nothing here depends on the
+//! scale of the scene.
 //!
 //! **No division by zero, no NaN.** A direction component smaller than `2^-60` of the greatest
 //! is taken to be that: over the whole scene the ray moves by far less than `margin`. Parameters
@@ -19,7 +21,7 @@ use crate::geometry::Aabb;
 use crate::simd::{Lanes, Mask};
 
 /// Half the thickness of a wall, relative to the reach.
-const MARGIN: f32 = 1.0 / (1 << 20) as f32;
+const MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// The least direction component, relative to the greatest.
 const FLATTEST: f32 = 1.0 / (1u64 << 60) as f32;

@@ -10,18 +10,14 @@
 //! rounding is monotone and the products are rounded alike; where it is zero, double precision
 //! (in which products of two floats are exact) decides. That is why nothing here is fused.
 //!
-//! **Distance.** The paper weights the corners' depths with the edge functions, whose errors grow
-//! with the triangle: on the sides of a square of 900 m `t` was off by up to 5 mm two metres from
-//! the ray's origin, and the weights of a sliver are mostly noise. Here `t` is where the ray meets
-//! the triangle's plane, with a normal from double precision (computed only for the few triangles
-//! that some lane is inside of). Its error is some ulps of the first corner's distance, whatever
-//! the triangle's shape. What the paper's form does guarantee, a `t` between the corners' depths, is
-//! kept by clamping: it also decides for triangles seen so nearly edge-on that the plane does not.
+//! `t` is not the paper's: see [`distance`].
 //!
 //! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
 //! it would only turn all three signs round.
 
-use super::{Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
+mod distance;
+
+use super::{Candidate, Corners, Lanes3, RENAMED, Test};
 use crate::simd::{Lanes, Mask};
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
@@ -166,27 +162,10 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
         let sum = a + b + c;
         inside = inside & (sum.lt(zero) | zero.lt(sum));
 
-        // Distance: where the ray meets the plane, but between the corners' depths.
-        let [nx, ny, nz] = self.splat_renamed(&plane_normal(corners));
-        let [px, py, pz] = self.translated(&corners[0]);
-        let [dx, dy, dz] = self.direction;
-        let t = (nx * px + ny * py + nz * pz) / (nx * dx + ny * dy + nz * dz);
-        let [_, _, sz] = self.shear;
-        let (az, bz, cz) = (sz * az, sz * bz, sz * cz);
-        let (nearest, farthest) = (az.min(bz).min(cz), az.max(bz).max(cz));
-        let t = t.max(nearest).min(farthest);
-
+        let t = self.distance(corners, inside, &[az, bz, cz]);
         let inverse = L::splat(1.0) / sum;
         Candidate { inside, t, u: b * inverse, v: c * inverse }
     }
-}
-
-/// A normal whose greatest component is 1, right to the last bits whatever the triangle's shape
-/// and size; NaNs for a triangle without area.
-#[inline(always)]
-fn plane_normal(corners: &Corners) -> [f32; 3] {
-    let n = normal_in_double(corners);
-    (n / n.abs().max_element()).as_vec3().to_array()
 }
 
 /// The edge functions of the lanes in `lanes`, computed in double precision; those of the other
