@@ -114,15 +114,18 @@ impl Expansion {
 
     /// Adds `x * y`.
     fn add_product(&mut self, x: f64, y: f64) {
-        let [high, low] = two_product(x, y);
+        // The rounding error first, then the rounded product: an expansion itself.
+        let product = two_product(x, y);
         let mut sum = [0.0; MOST];
-        self.len = fast_expansion_sum_zeroelim(&self.components[..self.len], &[low, high], &mut sum);
+        self.len = fast_expansion_sum_zeroelim(&self.components[..self.len], &product, &mut sum);
         self.components = sum;
     }
 
     /// Its value: the components overlap nowhere, so the greatest has the sign.
     fn finish(self) -> Certain {
-        Certain(self.components[..self.len].iter().sum())
+        let components = &self.components[..self.len];
+        debug_assert!(components.windows(2).all(|pair| pair[0].abs() < pair[1].abs()));
+        Certain(components.iter().sum())
     }
 }
 
@@ -132,6 +135,15 @@ mod tests {
 
     fn point(x: f32, y: f32, z: f32) -> DVec3 {
         DVec3::new(x.into(), y.into(), z.into())
+    }
+
+    /// Uniform in -4..4.
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 0.0f64;
+        move || {
+            state = (state + 0.618_033_988_749_895).fract();
+            (state * 8.0 - 4.0) as f32
+        }
     }
 
     #[test]
@@ -153,12 +165,23 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_left_of_a_ray_in_the_plane() {
+        // The products are multiplied out about the coordinates' origin, so they have to cancel.
+        let mut number = numbers();
+        for _ in 0..20_000 {
+            let y = number();
+            let mut p = |y| point(number(), y, number());
+            let (d, o, a, b, c) = (p(0.0), p(y), p(y), p(y), p(y));
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                assert_eq!(volume(d, p, q, o).value(), 0.0);
+            }
+            assert_eq!(along_normal(a, b, c, o).value(), 0.0);
+        }
+    }
+
+    #[test]
     fn the_exact_forms_agree_with_the_quick_ones() {
-        let mut state = 0.0f64;
-        let mut number = || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 8.0 - 4.0) as f32
-        };
+        let mut number = numbers();
         for _ in 0..1000 {
             let mut p = || point(number(), number(), number());
             let (a, b, c, o) = (p(), p(), p(), p());
