@@ -20,7 +20,8 @@ pub struct Hit {
     /// The triangle's index in its mesh, [`NO_PRIMITIVE`] for a miss.
     pub primitive: u32,
     /// `(p1 - p0) x (p2 - p0)`, not normalised, on the side of the corners' counter-clockwise
-    /// order whichever side the ray came from; zero for a miss.
+    /// order whichever side the ray came from; zero for a miss. Where that would overflow or lose
+    /// bits near zero, its greatest component is 1 or -1 instead.
     pub normal: Vec3,
 }
 

@@ -7,21 +7,28 @@ mod build;
 mod node;
 mod params;
 mod sah;
+mod scale;
 mod stats;
 mod validate;
 
 pub use build::BuildProgress;
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub use scale::{Scale, exponent};
 pub use stats::TreeStats;
 
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Corners;
 use crate::mesh::Mesh;
+use glam::Vec3;
 
 /// What a traversal kernel asks of a tree.
+///
+/// Its coordinates are the mesh's times the scale, which hardly ever is anything but 1.
 pub trait Tree {
+    /// What multiplies the mesh's coordinates.
+    fn scale(&self) -> Scale;
     /// The box around all triangles.
     fn bounds(&self) -> &Aabb;
     /// Where every walk begins.
@@ -44,6 +51,7 @@ pub struct KdTree {
     /// Corners by primitive id.
     triangles: Vec<Corners>,
     bounds: Aabb,
+    scale: Scale,
     params: BuildParams,
 }
 
@@ -57,13 +65,25 @@ impl KdTree {
     /// uses is not finite, or a parameter makes no sense.
     pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
         params.check()?;
-        let triangles = gather(mesh)?;
-        let bounds = Aabb::of_points(triangles.iter().flatten().map(|&corner| corner.into()));
+        let mut triangles = gather(mesh)?;
+        let bounds =
+            |triangles: &[Corners]| Aabb::of_points(triangles.iter().flatten().map(|&corner| corner.into()));
+        let scale = Scale::of_bounds(&bounds(&triangles));
+        if !scale.is_none() {
+            triangles.iter_mut().for_each(|corners| *corners = scale.apply(corners));
+        }
+        let bounds = bounds(&triangles);
         let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
-        Ok(Self { nodes, references, triangles, bounds, params: params.clone() })
+        Ok(Self { nodes, references, triangles, bounds, scale, params: params.clone() })
     }
 
-    /// The corners of all triangles, by primitive id.
+    /// The box around all triangles, in the mesh's coordinates.
+    pub fn mesh_bounds(&self) -> Aabb {
+        let [min, max, _] = self.scale.undo(&[self.bounds.min, self.bounds.max, Vec3::ZERO].map(Vec3::into));
+        Aabb { min: min.into(), max: max.into() }
+    }
+
+    /// The corners of all triangles, by primitive id, in the tree's coordinates.
     #[inline(always)]
     pub fn triangles(&self) -> &[Corners] {
         &self.triangles
@@ -108,6 +128,11 @@ fn gather(mesh: &Mesh) -> Result<Vec<Corners>> {
 }
 
 impl Tree for KdTree {
+    #[inline(always)]
+    fn scale(&self) -> Scale {
+        self.scale
+    }
+
     #[inline(always)]
     fn bounds(&self) -> &Aabb {
         &self.bounds

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
 use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
 use crate::geometry::{Aabb, Accuracy, Hit, Ray};
-use crate::kdtree::{BuildParams, BuildProgress, KdTree, Tree, TreeStats};
+use crate::kdtree::{BuildParams, BuildProgress, KdTree, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa, Simd, Task};
 use rayon::prelude::*;
@@ -89,7 +89,7 @@ impl Accel {
 
     /// The box around all triangles.
     pub fn bounds(&self) -> Aabb {
-        *self.tree.bounds()
+        self.tree.mesh_bounds()
     }
 
     /// Figures about the tree. Walks all of it.

@@ -4,13 +4,16 @@
 //! over [`crate::simd::Lanes`] and [`crate::kdtree::Tree`]; they know no files and no threads.
 //!
 //! **What a hit is, in every kernel and on every instruction set:** of all triangles that the
-//! watertight test finds within the closed interval `tnear..=tfar`, the one with the least `t`,
-//! and of those with equal `t` the one with the lowest primitive id. Answers agree bit for bit.
+//! chosen accuracy's test finds with a `t` in the closed interval `tnear..=tfar`, the one with the
+//! least `t`, and of those with equal `t` the one with the lowest primitive id. Answers agree bit
+//! for bit. A ray with a NaN in it, an infinite or NaN origin or direction, or a zero direction hits
+//! nothing.
 
 mod accel;
 mod kernel;
 mod lanes;
 mod packet;
+mod range;
 mod walk;
 
 pub use accel::Accel;

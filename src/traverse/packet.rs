@@ -11,6 +11,7 @@
 //! With `W = 1` and plain floats this is the single-ray kernel.
 
 use super::lanes::{HitPacket, RayPacket};
+use super::range::{adapt, is_ordinary};
 use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::NO_PRIMITIVE;
 use crate::geometry::triangle::{self, Mode, Test};
@@ -71,15 +72,19 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
     rays: &RayPacket<W>,
     active: u32,
 ) -> HitPacket<W> {
+    let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
+    let rays = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
     let closest = walk::<W, L, T, M, false>(tree, records, rays, active);
+
+    // Fill in what belongs to the triangle.
     let primitive = L::ids_store(closest.primitive);
     let (t, u, v) = (closest.t.store(), closest.u.store(), closest.v.store());
     let mut hits = HitPacket::miss();
     for lane in 0..W {
         if primitive[lane] != NONE {
             let id = primitive[lane] as u32;
-            let normal = triangle::normal(tree.corners(id));
             let record = &records[id as usize];
+            let normal = triangle::normal(tree.corners(id));
             hits.t[lane] = t[lane];
             [hits.u[lane], hits.v[lane]] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
             hits.primitive[lane] = id;
@@ -87,6 +92,9 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
                 hits.normal[axis][lane] = normal[axis];
             }
         }
+    }
+    if let Some(adapted) = adapted {
+        adapted.undo(&mut hits, tree);
     }
     hits
 }
@@ -99,6 +107,8 @@ pub fn occluded<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
     rays: &RayPacket<W>,
     active: u32,
 ) -> u32 {
+    let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
+    let rays = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
     let found = walk::<W, L, T, M, true>(tree, records, rays, active);
     !L::ids_less(L::ids(NONE - 1), found.primitive).bits() & active
 }

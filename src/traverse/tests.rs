@@ -1,7 +1,7 @@
 //! Small checks of the kernels; the large ones are in `tests/`.
 
 use super::*;
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::{Colors, Mesh};
 use crate::simd::Isa;
@@ -96,4 +96,53 @@ fn lanes_that_are_not_active_stay_misses() {
     }
     assert_eq!(accel.occluded_packet(&rays, 0b101), 0b101);
     assert_eq!(accel.occluded_packet(&rays, 0), 0);
+}
+
+/// The square enlarged by `place`, and directions of the length `speed`.
+#[test]
+fn powers_of_two_change_nothing_but_exponents() {
+    for place in [-149 + 24, -100, -60, -31, -30, -1, 0, 1, 39, 40, 41, 90, 120] {
+        let place = f64::powi(2.0, place) as f32;
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y].into_iter().map(|p| p * place);
+        let mesh = Mesh {
+            positions: positions.collect(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            colors: Colors::default(),
+        };
+        let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
+        assert_eq!(accel.bounds().max, Vec3::new(place, place, 0.0));
+        for accuracy in Accuracy::ALL {
+            for isa in Isa::available() {
+                let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
+                let accel = accel.with_isa(isa).with_accuracy(accuracy);
+                for kernel in Kernel::ALL {
+                    for speed in [f32::from_bits(1 << 10), 1e-38, 2e-10, 1.0, 1e9, 3e9, 1e38] {
+                        let origin = Vec3::new(0.75, 0.25, 2.0) * place;
+                        let direction = Vec3::new(0.0, 0.0, -speed);
+                        let t = f64::from(place) * 2.0 / f64::from(speed);
+                        let name = format!("{accuracy} {kernel} on {isa}: {place:e}, {speed:e}");
+                        if t > f64::from(f32::MAX) {
+                            assert!(
+                                !intersect(&accel, kernel, Ray::new(origin, direction)).is_hit(),
+                                "{name}"
+                            );
+                            continue;
+                        }
+                        let t = t as f32;
+                        let hit = intersect(&accel, kernel, Ray::new(origin, direction));
+                        assert_eq!((hit.primitive, hit.u, hit.v), (0, 0.5, 0.25), "{name}");
+                        assert!(hit.t.to_bits().abs_diff(t.to_bits()) <= 1, "{name}: {} for {t}", hit.t);
+                        assert!(hit.normal.z > 0.0 && hit.normal.x == 0.0, "{name}");
+                        // The unit of the interval is the ray's.
+                        if t > 1e-30 && t < 1e30 {
+                            let beyond = Ray::segment(origin, direction, t * 1.5, f32::INFINITY);
+                            assert!(!intersect(&accel, kernel, beyond).is_hit(), "{name}");
+                            let before = Ray::segment(origin, direction, 0.0, t * 0.5);
+                            assert!(!intersect(&accel, kernel, before).is_hit(), "{name}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -11,7 +11,7 @@
 //! triangle, and the order in which cells are looked at decides nothing. Nothing here depends on the
 //! scale of the scene.
 //!
-//! **No division by zero, no NaN.** A direction component smaller than `2^-60` of the greatest
+//! **No division by zero, no NaN.** A direction component smaller than `2^-40` of the greatest
 //! is taken to be that: over the whole scene the ray moves by far less than `margin`. Parameters
 //! of planes so stay finite (a ray in a plane gets the slab's whole interval, a ray beside it
 //! one that lies far beyond the scene or behind the origin).
@@ -24,7 +24,7 @@ use crate::simd::{Lanes, Mask};
 const MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// The least direction component, relative to the greatest.
-const FLATTEST: f32 = 1.0 / (1u64 << 60) as f32;
+const FLATTEST: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// On which side of a plane across an axis rays come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

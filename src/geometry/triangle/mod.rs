@@ -26,10 +26,14 @@ pub type Corners = [[f32; 3]; 3];
 const RENAMED: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 /// The geometric normal `(p1 - p0) x (p2 - p0)`, not normalised. Computed in double precision: in
-/// single, the normal of a sliver may point anywhere.
+/// single, the normal of a sliver may point anywhere. Where it would overflow or lose bits near
+/// zero, its greatest component is 1 or -1 instead; zero only for a triangle without area.
 #[inline]
 pub fn normal(corners: &Corners) -> Vec3 {
-    normal_in_double(corners).as_vec3()
+    let normal = normal_in_double(corners);
+    let size = normal.abs().max_element();
+    let in_range = size >= f64::from(f32::MIN_POSITIVE) && size <= f64::from(f32::MAX);
+    if in_range || size == 0.0 { normal.as_vec3() } else { (normal / size).as_vec3() }
 }
 
 /// The same before it is rounded.
