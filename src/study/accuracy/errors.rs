@@ -1,0 +1,163 @@
+//! Errors of an engine's answers against the truth: counted, one by one, never averaged away.
+//!
+//! | error | truth | engine |
+//! |---|---|---|
+//! | missed | a hit | a miss |
+//! | false hit | a miss | a hit |
+//! | wrong primitive | a hit | a hit of a triangle that is neither the nearest nor [tied](Truth::ties) with it |
+//!
+//! So triangles whose exact `t` rounds to the same float are interchangeable; naming another than
+//! the lowest id of the exactly nearest is counted apart and no error. A ray that passes an edge at
+//! a rounding's distance and is given to the neighbour across it has the wrong primitive but nearly
+//! the right place; a ray that slips through a surface onto what lies behind has the wrong
+//! primitive *elsewhere*. How far `t` and the weights are off is said of right primitives only.
+
+use crate::geometry::Hit;
+use crate::study::bench::agreement::TOLERANCE;
+use crate::study::reference::Truth;
+use serde::Serialize;
+
+/// Errors of one engine on one set of rays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Errors {
+    /// Rays asked for.
+    pub rays: u64,
+    /// Rays that hit something in truth.
+    pub hits: u64,
+    /// Hits that were missed.
+    pub missed: u64,
+    /// Misses that were given as hits.
+    pub false_hits: u64,
+    /// Hits given for a triangle that is not the nearest.
+    pub wrong_primitive: u64,
+    /// Those of them whose `t` is off by more than [`TOLERANCE`], relative to the greater of the two:
+    /// another place, not a neighbour at the same place.
+    pub elsewhere: u64,
+    /// Right primitives that are not the lowest id of the exactly nearest. No errors.
+    pub not_lowest: u64,
+    /// How far right hits are off; `None` for occlusion, and where no hit is right.
+    pub deviation: Option<Deviation>,
+}
+
+/// How far hits of right primitives are off.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Deviation {
+    /// Hits with a right primitive.
+    pub hits: u64,
+    /// Floats between the engine's `t` and the nearest float to the true one: the most.
+    pub max_ulps: u32,
+    /// The same: the least that 99.9 % do not exceed.
+    pub p999_ulps: u32,
+    /// The same: the mean.
+    pub mean_ulps: f64,
+    /// Greatest error of `t` relative to the true one, where that is not zero.
+    pub max_relative: f64,
+    /// Greatest error of a barycentric weight, where the engine names the truth's own primitive.
+    pub max_weight: f64,
+}
+
+impl Errors {
+    /// Counts the errors of closest hits.
+    ///
+    /// # Panics
+    /// If there are not as many hits as truths.
+    pub fn of_closest(truths: &[Truth], hits: &[Hit]) -> Self {
+        assert_eq!(truths.len(), hits.len(), "as many hits as truths");
+        let mut errors = Self { rays: hits.len() as u64, ..Self::default() };
+        let mut tally = Tally::default();
+        for (truth, hit) in truths.iter().zip(hits) {
+            errors.hits += u64::from(truth.is_hit());
+            match (truth.is_hit(), hit.is_hit()) {
+                (false, false) => {}
+                (true, false) => errors.missed += 1,
+                (false, true) => errors.false_hits += 1,
+                (true, true) if truth.names(hit.primitive) => {
+                    errors.not_lowest += u64::from(hit.primitive != truth.primitive);
+                    tally.add(truth, hit);
+                }
+                (true, true) => {
+                    errors.wrong_primitive += 1;
+                    errors.elsewhere += u64::from(!same_place(truth.t, hit.t));
+                }
+            }
+        }
+        errors.deviation = tally.sum_up();
+        errors
+    }
+
+    /// Counts the errors of occlusion.
+    ///
+    /// # Panics
+    /// If there are not as many answers as truths.
+    pub fn of_any(truths: &[bool], occluded: &[bool]) -> Self {
+        assert_eq!(truths.len(), occluded.len(), "as many answers as truths");
+        let count = |truth, answer| {
+            truths.iter().zip(occluded).filter(|&pair| pair == (&truth, &answer)).count() as u64
+        };
+        let (missed, false_hits) = (count(true, false), count(false, true));
+        let hits = missed + count(true, true);
+        Self { rays: truths.len() as u64, hits, missed, false_hits, ..Self::default() }
+    }
+
+    /// Missed hits, false hits and wrong primitives together.
+    pub fn total(&self) -> u64 {
+        self.missed + self.false_hits + self.wrong_primitive
+    }
+
+    /// A count for a million rays; 0 where there are no rays.
+    pub fn per_million(&self, count: u64) -> f64 {
+        count as f64 * 1e6 / self.rays.max(1) as f64
+    }
+}
+
+/// Deviations as they come in.
+#[derive(Default)]
+struct Tally {
+    ulps: Vec<u32>,
+    max_relative: f64,
+    max_weight: f64,
+}
+
+impl Tally {
+    fn add(&mut self, truth: &Truth, hit: &Hit) {
+        self.ulps.push(ulps_between(hit.t, truth.t));
+        if truth.t_f64 != 0.0 {
+            let relative = (f64::from(hit.t) - truth.t_f64).abs() / truth.t_f64.abs();
+            self.max_relative = self.max_relative.max(relative);
+        }
+        if hit.primitive == truth.primitive {
+            let off = |weight: f32, truth: f64| (f64::from(weight) - truth).abs();
+            self.max_weight = self.max_weight.max(off(hit.u, truth.u)).max(off(hit.v, truth.v));
+        }
+    }
+
+    fn sum_up(mut self) -> Option<Deviation> {
+        let hits = self.ulps.len();
+        if hits == 0 {
+            return None;
+        }
+        self.ulps.sort_unstable();
+        Some(Deviation {
+            hits: hits as u64,
+            max_ulps: self.ulps[hits - 1],
+            p999_ulps: self.ulps[(hits * 999).div_ceil(1000) - 1],
+            mean_ulps: self.ulps.iter().map(|&n| f64::from(n)).sum::<f64>() / hits as f64,
+            max_relative: self.max_relative,
+            max_weight: self.max_weight,
+        })
+    }
+}
+
+/// Steps from one float to the next between two floats that are not NaN; zeros count as one.
+pub fn ulps_between(a: f32, b: f32) -> u32 {
+    // Places on a line: magnitudes in the order of their bits, the negative ones turned round.
+    let place = |x: f32| {
+        let magnitude = i64::from(x.abs().to_bits());
+        if x.is_sign_negative() { -magnitude } else { magnitude }
+    };
+    place(a).abs_diff(place(b)) as u32
+}
+
+fn same_place(a: f32, b: f32) -> bool {
+    (a - b).abs() <= TOLERANCE * a.abs().max(b.abs())
+}
