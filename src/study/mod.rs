@@ -6,3 +6,4 @@ pub mod bench;
 pub mod peers;
 pub mod rays;
 pub mod reference;
+pub mod views;

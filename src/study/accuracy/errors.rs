@@ -21,7 +21,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Errors {
     /// Rays asked for.
-    pub rays: u64,
+    pub count: u64,
     /// Rays that hit something in truth.
     pub hits: u64,
     /// Hits that were missed.
@@ -63,7 +63,7 @@ impl Errors {
     /// If there are not as many hits as truths.
     pub fn of_closest(truths: &[Truth], hits: &[Hit]) -> Self {
         assert_eq!(truths.len(), hits.len(), "as many hits as truths");
-        let mut errors = Self { rays: hits.len() as u64, ..Self::default() };
+        let mut errors = Self { count: hits.len() as u64, ..Self::default() };
         let mut tally = Tally::default();
         for (truth, hit) in truths.iter().zip(hits) {
             errors.hits += u64::from(truth.is_hit());
@@ -96,7 +96,7 @@ impl Errors {
         };
         let (missed, false_hits) = (count(true, false), count(false, true));
         let hits = missed + count(true, true);
-        Self { rays: truths.len() as u64, hits, missed, false_hits, ..Self::default() }
+        Self { count: truths.len() as u64, hits, missed, false_hits, ..Self::default() }
     }
 
     /// Missed hits, false hits and wrong primitives together.
@@ -106,7 +106,7 @@ impl Errors {
 
     /// A count for a million rays; 0 where there are no rays.
     pub fn per_million(&self, count: u64) -> f64 {
-        count as f64 * 1e6 / self.rays.max(1) as f64
+        count as f64 * 1e6 / self.count.max(1) as f64
     }
 }
 

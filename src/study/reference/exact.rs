@@ -14,13 +14,13 @@ use std::cmp::Ordering;
 ///
 /// Ordered by `t` alone: two triangles met at the same real `t` compare equal.
 #[derive(Clone, Debug)]
-pub struct Exact {
+pub struct Meeting {
     t: Relaxed,
     u: Relaxed,
     v: Relaxed,
 }
 
-impl Exact {
+impl Meeting {
     /// The ray's parameter, rounded to the nearest float, ties to even.
     pub fn t(&self) -> f32 {
         // Fractions have no negative zero, but their rounding has.
@@ -43,29 +43,29 @@ impl Exact {
     }
 }
 
-impl Ord for Exact {
+impl Ord for Meeting {
     fn cmp(&self, other: &Self) -> Ordering {
         self.t.cmp(&other.t)
     }
 }
 
-impl PartialOrd for Exact {
+impl PartialOrd for Meeting {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Exact {
+impl PartialEq for Meeting {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Exact {}
+impl Eq for Meeting {}
 
 /// Where the ray meets the closed triangle within its closed interval. Ray and corners must be
 /// finite but for `tfar`; see [`super`] for what counts as a hit.
-pub(super) fn meet(ray: &Ray, corners: &[Vec3; 3]) -> Option<Exact> {
+pub(super) fn meet(ray: &Ray, corners: &[Vec3; 3]) -> Option<Meeting> {
     let origin = whole(ray.origin);
     let direction = whole(ray.direction);
     let [a, b, c] = corners.map(|corner| minus(&whole(corner), &origin));
@@ -90,7 +90,7 @@ pub(super) fn meet(ray: &Ray, corners: &[Vec3; 3]) -> Option<Exact> {
     let after_start = ray.tnear == f32::NEG_INFINITY || t >= rational(ray.tnear);
     let before_end =
         if ray.tfar == f32::INFINITY { t.to_f32().value() < f32::INFINITY } else { t <= rational(ray.tfar) };
-    (after_start && before_end).then(|| Exact { t, u: fraction(of_b), v: fraction(of_c) })
+    (after_start && before_end).then(|| Meeting { t, u: fraction(of_b), v: fraction(of_c) })
 }
 
 /// A finite point or vector in units of 2^-149.

@@ -26,7 +26,7 @@ mod exact;
 mod filter;
 mod hierarchy;
 
-pub use exact::Exact;
+pub use exact::Meeting;
 
 use crate::geometry::{Aabb, NO_PRIMITIVE, Ray};
 use crate::mesh::Mesh;
@@ -125,7 +125,7 @@ impl<'a> Reference<'a> {
     ///
     /// # Panics
     /// If there is no such primitive.
-    pub fn meets(&self, ray: &Ray, primitive: u32) -> Option<Exact> {
+    pub fn meets(&self, ray: &Ray, primitive: u32) -> Option<Meeting> {
         let corners = self.mesh.corners(primitive);
         Probe::new(ray)?;
         corners.iter().all(|corner| corner.is_finite()).then(|| exact::meet(ray, &corners)).flatten()
@@ -157,7 +157,7 @@ impl<'a> Reference<'a> {
     /// The truth, of those that are met.
     fn nearest(&self, ray: &Ray, candidates: impl Iterator<Item = u32>) -> Truth {
         let corners = |id: u32| -> [Vec3; 3] { self.mesh.corners(id) };
-        let mut met: Vec<(Exact, u32)> =
+        let mut met: Vec<(Meeting, u32)> =
             candidates.filter_map(|id| exact::meet(ray, &corners(id)).map(|found| (found, id))).collect();
         met.sort_unstable();
         let Some((found, primitive)) = met.first() else { return Truth::MISS };
