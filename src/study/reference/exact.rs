@@ -64,7 +64,8 @@ impl PartialEq for Meeting {
 impl Eq for Meeting {}
 
 /// Where the ray meets the closed triangle within its closed interval. Ray and corners must be
-/// finite but for `tfar`; see [`super`] for what counts as a hit.
+/// finite, and one end of the interval
+/// below and the other above infinity; see [`super`] for what counts as a hit.
 pub(super) fn meet(ray: &Ray, corners: &[Vec3; 3]) -> Option<Meeting> {
     let origin = whole(ray.origin);
     let direction = whole(ray.direction);

@@ -71,7 +71,9 @@ impl Probe {
         let sound = ray.origin.is_finite()
             && ray.direction.is_finite()
             && ray.direction != Vec3::ZERO
-            && ray.tnear <= ray.tfar;
+            && ray.tnear <= ray.tfar
+            && ray.tnear < f32::INFINITY
+            && ray.tfar > f32::NEG_INFINITY;
         sound.then(|| {
             let direction = double(ray.direction);
             Self {
