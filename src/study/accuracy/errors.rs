@@ -161,3 +161,81 @@ pub fn ulps_between(a: f32, b: f32) -> u32 {
 fn same_place(a: f32, b: f32) -> bool {
     (a - b).abs() <= TOLERANCE * a.abs().max(b.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(t: f64, primitive: u32, ties: &[u32]) -> Truth {
+        Truth { t: t as f32, t_f64: t, u: 0.25, v: 0.5, primitive, ties: ties.to_vec() }
+    }
+
+    fn hit(t: f32, primitive: u32) -> Hit {
+        Hit { t, u: 0.25, v: 0.5, primitive, ..Hit::MISS }
+    }
+
+    #[test]
+    fn every_error_is_counted_once() {
+        let (one, next) = (1f32, 1f32.next_up());
+        let cases = [
+            (Truth::MISS, Hit::MISS),
+            (truth(1.0, 7, &[]), hit(one, 7)),
+            (truth(1.0, 7, &[8, 9]), hit(next, 9)), // A tie, an ulp off.
+            (truth(1.0, 7, &[]), Hit::MISS),        // Missed.
+            (Truth::MISS, hit(one, 7)),             // A false hit.
+            (truth(1.0, 7, &[8]), hit(one, 6)),     // The neighbour.
+            (truth(1.0, 7, &[8]), hit(2.0, 6)),     // What lies behind.
+            (truth(1.0, 7, &[8]), hit(f32::NAN, 6)), // Nowhere at all.
+        ];
+        let (truths, hits): (Vec<_>, Vec<_>) = cases.into_iter().unzip();
+        let errors = Errors::of_closest(&truths, &hits);
+        let deviation = errors.deviation.clone().expect("two are right");
+        assert_eq!((errors.count, errors.hits), (8, 6));
+        assert_eq!((errors.missed, errors.false_hits), (1, 1));
+        assert_eq!((errors.wrong_primitive, errors.elsewhere, errors.not_lowest), (3, 2, 1));
+        assert_eq!(errors.total(), 5);
+        assert_eq!(errors.per_million(errors.missed), 125_000.0);
+        assert_eq!((deviation.hits, deviation.max_ulps, deviation.p999_ulps), (2, 1, 1));
+        assert_eq!((deviation.mean_ulps, deviation.max_weight), (0.5, 0.0));
+        assert!((deviation.max_relative - f64::from(f32::EPSILON)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn occlusion_is_right_or_wrong() {
+        let errors = Errors::of_any(&[true, true, true, false, false], &[true, false, false, true, false]);
+        assert_eq!((errors.count, errors.hits, errors.missed, errors.false_hits), (5, 3, 2, 1));
+        assert_eq!((errors.wrong_primitive, errors.deviation), (0, None));
+    }
+
+    #[test]
+    fn deviations_are_those_of_right_hits_alone() {
+        let mut truths = vec![truth(1.0, 3, &[]); 1000];
+        let mut hits = vec![hit(1.0, 3); 1000];
+        (hits[17].t, hits[17].u) = (1.5, 0.75);
+        truths.push(truth(1.0, 4, &[3]));
+        hits.push(Hit { v: 0.0, ..hit(1.0, 3) }); // The weights of another triangle say nothing.
+        truths.push(truth(1.0, 5, &[]));
+        hits.push(hit(100.0, 3));
+        let deviation = Errors::of_closest(&truths, &hits).deviation.expect("most are right");
+        assert_eq!((deviation.hits, deviation.max_ulps, deviation.p999_ulps), (1001, 1 << 22, 0));
+        assert_eq!((deviation.max_relative, deviation.max_weight), (0.5, 0.5));
+        hits.fill(Hit::MISS);
+        assert_eq!(Errors::of_closest(&truths, &hits).deviation, None);
+    }
+
+    #[test]
+    fn ulps_are_steps_from_float_to_float() {
+        let tiny = f32::from_bits(1);
+        for (a, b, steps) in [
+            (1.0, 1.0, 0),
+            (1.0, 1f32.next_down(), 1),
+            (0.0, -0.0, 0),
+            (tiny, -tiny, 2),
+            (1.0, 2.0, 1 << 23),
+            (f32::MAX, f32::INFINITY, 1),
+            (f32::NEG_INFINITY, f32::INFINITY, 2 * 0x7f80_0000),
+        ] {
+            assert_eq!((ulps_between(a, b), ulps_between(b, a)), (steps, steps), "{a} {b}");
+        }
+    }
+}
