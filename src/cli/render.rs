@@ -98,6 +98,7 @@ pub fn run(args: &Args) -> Result<()> {
     let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
     let scene = model.build(&profile.build, isa)?;
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
+    camera.check()?;
     let lighting = args.lighting(&camera, &scene);
     let renderer = Renderer::new(&scene.accel, &scene.model.mesh, settings)?;
 

@@ -1,6 +1,7 @@
 //! A pinhole camera: where the eye is and what it sees.
 
 use super::View;
+use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -66,6 +67,14 @@ impl Camera {
     /// How far the eye is from the point that it looks at.
     pub fn distance(&self) -> f32 {
         (self.at.as_dvec3() - self.eye.as_dvec3()).length() as f32
+    }
+
+    /// Whether rays can be made of it.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for `--camera`: a number is not finite, or there is no direction of view.
+    pub fn check(&self) -> Result<()> {
+        self.fault().map_or(Ok(()), |fault| Err(Error::option("--camera", fault)))
     }
 
     /// What is wrong with it, if anything: a sentence.

@@ -15,7 +15,8 @@ impl Camera {
     /// picture's width divided by its height.
     ///
     /// The eye is as near as it can be: on the line through the box's middle, where the first of
-    /// the eight corners touches the picture's margin. A box that is a point gets a camera too.
+    /// the eight corners touches the picture's margin. A box that is a point gets a camera too. Of a
+    /// box that nearly fills the range of floats the eye is infinite, which [`Camera::check`] refuses.
     pub fn framing(bounds: &Aabb, aspect: f32) -> Self {
         let (low, high) = if bounds.is_empty() {
             (DVec3::ZERO, DVec3::ZERO)
@@ -41,7 +42,8 @@ impl Camera {
             .fold(0.0, f64::max);
 
         // Of a point there is no best distance; a larger one than its coordinates' rounding will do.
-        let distance = distance.max(center.abs().max_element() * 1e-5).max(1e-6);
+        let distance = distance.max(center.abs().max_element() * 1e-5);
+        let distance = if distance > 0.0 { distance } else { 1.0 };
         Self::new((center + toward_eye * distance).as_vec3(), center.as_vec3())
     }
 }
@@ -71,7 +73,7 @@ mod tests {
         for size in
             [Vec3::ONE, Vec3::new(100.0, 1.0, 1.0), Vec3::new(1.0, 0.0, 30.0), Vec3::new(0.01, 9.0, 1.0)]
         {
-            for scale in [1e-4, 1.0, 1e6] {
+            for scale in [1e-36, 1e-4, 1.0, 1e6, 1e35] {
                 for aspect in [0.25, 1.0, 16.0 / 9.0] {
                     let min = Vec3::new(-3.0, 2.0, 7.0) * scale;
                     let bounds = Aabb { min, max: min + size * scale };
@@ -92,7 +94,13 @@ mod tests {
     fn a_point_and_nothing_have_a_camera_too() {
         for bounds in [Aabb::EMPTY, Aabb { min: Vec3::splat(5e5), max: Vec3::splat(5e5) }] {
             let camera = Camera::framing(&bounds, 1.0);
-            assert_eq!(camera.fault(), None);
+            camera.check().expect("a camera");
         }
+    }
+
+    #[test]
+    fn a_box_that_leaves_no_room_for_an_eye_is_refused() {
+        let bounds = Aabb { min: Vec3::splat(-3e38), max: Vec3::splat(3e38) };
+        assert!(Camera::framing(&bounds, 1.0).check().is_err());
     }
 }

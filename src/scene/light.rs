@@ -48,11 +48,12 @@ impl Light {
         match *self {
             Self::Sun { toward, irradiance } => ShadowRay { toward, distance: f32::INFINITY, irradiance },
             Self::Point { position, irradiance, reach } => {
-                let way = position - point;
-                let distance = way.length();
+                // Squares of floats fit into double precision, whatever the scale of the scene.
+                let way = position.as_dvec3() - point.as_dvec3();
+                let (distance, reach) = (way.length(), f64::from(reach));
                 let fade = (reach * reach) / (reach * reach + distance * distance);
-                let toward = if distance > 0.0 { way / distance } else { Vec3::ZERO };
-                ShadowRay { toward, distance, irradiance: irradiance * fade }
+                let toward = if distance > 0.0 { (way / distance).as_vec3() } else { Vec3::ZERO };
+                ShadowRay { toward, distance: distance as f32, irradiance: irradiance * fade as f32 }
             }
         }
     }

@@ -19,8 +19,10 @@ pub trait Test<const W: usize, L: Lanes<W>>: Sized {
 
     /// One triangle against the lanes in `lanes`; what the others answer means nothing.
     ///
-    /// Edges and corners belong to the triangle. A triangle seen exactly edge-on, or without area,
-    /// or with a NaN in it, is never hit.
+    /// Edges and corners belong to the triangle. A triangle seen exactly edge-on, or with equal
+    /// corners, or with a NaN in it, is never hit. Nor is one whose corners lie on a line, but for
+    /// the watertight test, which sees corners moved by roundings: there such a triangle fills the
+    /// gap that so opens between its neighbours.
     fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
 
     /// The barycentric weights `(u, v)` of the triangle's second and third corner, from those that

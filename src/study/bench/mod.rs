@@ -134,6 +134,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
 
     let bounds = mesh.bounds();
     let camera = options.camera.unwrap_or_else(|| Camera::framing(&bounds, 1.0));
+    camera.check()?;
     let setup = Setup::new(camera, options.size, bounds, options.seed);
     let sets = RaySets::new(setup, mesh, |rays| {
         let mut hits = vec![Hit::MISS; rays.len()];
