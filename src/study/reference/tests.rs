@@ -126,7 +126,7 @@ fn ray_and_triangle(kind: Kind) -> impl Strategy<Value = (Ray, [Vec3; 3])> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn plain_numbers((ray, corners) in ray_and_triangle(Kind::Plain)) {
