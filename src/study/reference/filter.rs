@@ -132,7 +132,8 @@ impl Probe {
         }
         let t = above.value / below.value;
         let error = (above.error + t.abs() * below.error) / least;
-        let error = error * (1.0 + FEW) + t.abs() * FEW;
+        // The roundings of the quotient, of this bound and of the sums below.
+        let error = error * (1.0 + 2.0 * FEW) + t.abs() * FEW;
         let (low, high) = (t - error, t + error);
         if low > self.tfar || high < self.tnear {
             Verdict::Miss
