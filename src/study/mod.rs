@@ -1,7 +1,7 @@
 //! Experiments and their reports: how fast and how right engines are.
 //!
 //! [`mod@bench`] measures speed, [`accuracy`] errors; both on the same kinds of [`rays`], from the standard
-//! [`views`], and beside the same rivals. What is right, the [`reference`] says.
+//! [`views`], and beside the same rivals. What is right, the [`mod@reference`] says.
 
 pub mod accuracy;
 pub mod bench;
