@@ -40,7 +40,7 @@ fn for_each_kind(census: &Census, engine: &str, mode: &str, check: impl Fn(&Erro
 /// What must hold in every scene.
 fn sound(census: &Census) {
     for_each_kind(census, "raypack", "exact", |errors, row| {
-        assert_eq!(errors.total(), 0, "{row}");
+        assert_eq!((errors.total(), errors.not_lowest), (0, 0), "{row}");
         if let Some(deviation) = &errors.deviation {
             assert!(deviation.max_ulps <= 1 && deviation.max_weight < 1e-7, "{row}");
         }

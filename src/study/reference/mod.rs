@@ -68,6 +68,11 @@ impl Truth {
         self.primitive != NO_PRIMITIVE
     }
 
+    /// The lowest id among the nearest and its ties.
+    pub fn lowest(&self) -> u32 {
+        self.ties.first().map_or(self.primitive, |&tie| tie.min(self.primitive))
+    }
+
     /// Whether an engine that names this primitive is right: it is the nearest, or ties with it.
     pub fn names(&self, primitive: u32) -> bool {
         self.is_hit() && (primitive == self.primitive || self.ties.binary_search(&primitive).is_ok())
