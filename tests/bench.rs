@@ -54,6 +54,7 @@ fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
         let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} of {row}"));
         assert!(0.0 < number("low") && number("low") <= number("mrays_per_s"), "{row}");
         assert!(number("mrays_per_s") <= number("high") && number("hits") <= number("count"), "{row}");
+        assert_eq!(row.get("accuracy").is_some(), row["engine"] == "raypack", "{row}");
         assert!(row["mode"].is_string() && row["isa"].is_string() && number("bytes") > 0.0, "{row}");
     }
     for agreement in report["agreements"].as_array().unwrap() {
@@ -72,6 +73,23 @@ fn json_on_standard_output_is_nothing_but_json() {
 }
 
 #[test]
+fn every_accuracy_can_be_raced() {
+    let (_folder, model) = model();
+    for accuracy in ["fast", "watertight", "exact"] {
+        let run = bench(&model)
+            .args(["--engines", "raypack", "--rays", "camera,ao", "--threads", "1", "--accuracy", accuracy])
+            .args(["--json", "-"])
+            .assert();
+        let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
+        assert_eq!(report["header"]["accuracy"], accuracy);
+        let rows = report["rows"].as_array().unwrap();
+        assert!(rows.len() == 8 && rows.iter().all(|row| row["accuracy"] == accuracy));
+    }
+    let run = bench(&model).args(["--engines", "raypack", "--rays", "camera", "--threads", "1"]).assert();
+    run.success().stdout(predicate::str::contains("raypack's accuracy: watertight"));
+}
+
+#[test]
 fn bad_options_are_one_line_and_leave_no_report() {
     let (folder, model) = model();
     let file = folder.path().join("report.json");
@@ -80,6 +98,7 @@ fn bad_options_are_one_line_and_leave_no_report() {
         ("--rays", "camera,primary", "--rays"),
         ("--size", "32x16", "--size"),
         ("--camera", "eye=1", "--camera"),
+        ("--accuracy", "precise", "--accuracy: \"precise\""),
         ("--profile", "no-such-profile", "no-such-profile"),
     ] {
         let mut command = Command::cargo_bin("raypack").unwrap();

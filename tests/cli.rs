@@ -166,6 +166,20 @@ fn every_tuning_gives_the_same_file() {
 }
 
 #[test]
+fn every_accuracy_renders_and_is_reported() {
+    let place = Place::new();
+    for accuracy in ["fast", "watertight", "exact"] {
+        let arguments = format!("render house.ply -o {accuracy}.png --size 40x30 --accuracy {accuracy}");
+        let text = place.succeed(&arguments);
+        assert!(text.contains(&format!(", {accuracy}, ")), "{text}");
+        let report = json(&place.succeed(&format!("{arguments} --json -")));
+        assert_eq!(report["accuracy"], accuracy);
+    }
+    let report = json(&place.succeed("render house.ply -o default.png --size 40x30 --json -"));
+    assert_eq!(report["accuracy"], "watertight");
+}
+
+#[test]
 fn depth_and_normals_come_on_request() {
     let place = Place::new();
     let camera = "--camera eye=0,5,0;at=0,0,0;fov=20";
@@ -406,6 +420,7 @@ mod bad_input {
             ("--tile 0", "--tile: 0"),
             ("--tile 1025", "--tile: 1025"),
             ("--threads 1025", "--threads: 1025"),
+            ("--accuracy precise", "--accuracy: \"precise\" is not one of fast, watertight, exact"),
             ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16"),
             ("--orbit 0", "--orbit: 0"),
             ("--orbit 4 --step inf", "--step: inf"),

@@ -1,6 +1,7 @@
 //! `raypack bench MODEL`: rays per second, beside Embree and obvhs.
 
 use super::model::Model;
+use super::options::AccuracyOption;
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::profile::{self, Profile};
@@ -39,6 +40,8 @@ pub struct Args {
     /// Settings for building: a name in profiles/ or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
     profile: String,
+    #[command(flatten)]
+    accuracy: AccuracyOption,
     /// Rounds of each race at most; its middle round is reported
     #[arg(long, default_value_t = 9)]
     rounds: usize,
@@ -96,6 +99,7 @@ fn options(args: &Args) -> Result<Options> {
         pace: Pace { rounds: args.rounds, seconds: args.seconds, all_modes: args.all_modes, pin: args.pin },
         isa: Isa::from_env()?,
         hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
+        accuracy: args.accuracy.mode()?,
         build: Profile::find(&args.profile)?.build,
     })
 }
@@ -113,6 +117,7 @@ fn size(text: &str) -> Result<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Accuracy;
     use clap::Parser;
 
     #[derive(clap::Parser)]
@@ -131,6 +136,7 @@ mod tests {
         assert_eq!(options.kinds, RayKind::ALL);
         assert_eq!(options.engines, EngineName::ALL);
         assert_eq!((options.size, options.camera, options.threads[0]), (512, None, 1));
+        assert_eq!(options.accuracy, Accuracy::Watertight);
     }
 
     #[test]
@@ -144,6 +150,7 @@ mod tests {
             ("bench m.obj --rays camera,primary", "--rays"),
             ("bench m.obj --engines optix", "--engines"),
             ("bench m.obj --camera eye=1", "--camera"),
+            ("bench m.obj --accuracy precise", "--accuracy"),
         ] {
             let message = parse(line).unwrap_err().to_string();
             assert!(message.starts_with(option) && !message.contains('\n'), "{line}: {message}");

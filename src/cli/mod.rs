@@ -7,6 +7,7 @@ mod bench;
 mod generate;
 mod info;
 mod model;
+mod options;
 mod outputs;
 mod progress;
 mod render;

@@ -3,6 +3,7 @@
 mod report;
 
 use super::model::{Model, Scene};
+use super::options::AccuracyOption;
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
@@ -62,6 +63,8 @@ pub struct Args {
     /// Settings for building and rendering: a name in profiles/ or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
     profile: String,
+    #[command(flatten)]
+    accuracy: AccuracyOption,
     /// Leave out the shadows
     #[arg(long)]
     no_shadows: bool,
@@ -87,6 +90,7 @@ pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
     let profile = Profile::find(&args.profile)?;
     let settings = args.settings(&profile)?;
+    let accuracy = args.accuracy.mode()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
     let orbit = args.orbit()?;
     let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
@@ -96,7 +100,8 @@ pub fn run(args: &Args) -> Result<()> {
     debug!("{settings:?}");
 
     let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
-    let scene = model.build(&profile.build, isa)?;
+    let mut scene = model.build(&profile.build, isa)?;
+    scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
     let lighting = args.lighting(&camera, &scene);

@@ -2,6 +2,7 @@
 
 use crate::cli::model::{Scene, SceneReport};
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
+use crate::geometry::Accuracy;
 use crate::render::{FrameStats, RayCount, RenderSettings, Size};
 use crate::scene::Camera;
 use serde::Serialize;
@@ -28,6 +29,7 @@ pub struct Report<'a> {
     scene: SceneReport<'a>,
     profile: &'a str,
     isa: &'static str,
+    accuracy: Accuracy,
     packet: usize,
     tile: u32,
     threads: usize,
@@ -56,6 +58,7 @@ impl<'a> Report<'a> {
             scene: scene.report(),
             profile,
             isa: scene.accel.isa().name(),
+            accuracy: scene.accel.accuracy(),
             packet: settings.tuning.packet.width(),
             tile: settings.tuning.tile,
             threads: frames[0].stats.threads,
@@ -89,8 +92,9 @@ impl<'a> Report<'a> {
         lines.add(
             "engine",
             format!(
-                "raypack {version} ({build}), {}, {packets}, tiles of {}x{}, {} ({pinned})",
+                "raypack {version} ({build}), {}, {}, {packets}, tiles of {}x{}, {} ({pinned})",
                 self.isa,
+                self.accuracy,
                 self.tile,
                 self.tile,
                 counted(self.threads as u64, "thread"),

@@ -1,6 +1,6 @@
 //! What the bench asks of an engine, and the memory that its runs share.
 
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Accuracy, Hit, Ray};
 use std::sync::{Mutex, PoisonError};
 
 /// Rays that a worker takes at a time.
@@ -16,6 +16,11 @@ pub trait Engine: Sync {
 
     /// The instruction set that it runs on.
     fn isa(&self) -> String;
+
+    /// How it decides hits, if it has raypack's modes.
+    fn accuracy(&self) -> Option<Accuracy> {
+        None
+    }
 
     /// Whether modes that are far behind may be dropped after the qualifying round.
     fn qualifies(&self) -> bool {

@@ -36,7 +36,7 @@ pub use race::Pace;
 pub use report::{EngineInfo, Header, Report, Row};
 
 use crate::error::{Error, Result};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::scene::Camera;
@@ -103,6 +103,8 @@ pub struct Options {
     pub isa: Isa,
     /// Whether Embree is held to that instruction set too; else it chooses its best.
     pub hold_peers_to_isa: bool,
+    /// How raypack decides hits.
+    pub accuracy: Accuracy,
     /// How raypack's tree is built.
     pub build: BuildParams,
 }
@@ -115,7 +117,7 @@ pub struct Options {
 pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Report> {
     check(options)?;
     progress("building raypack's tree");
-    let ours = Ours::new(mesh, &options.build, options.isa)?;
+    let ours = Ours::new(mesh, &options.build, options.isa, options.accuracy)?;
     let mut notes = Vec::new();
     let mut peers: Vec<(EngineName, Box<dyn Engine>)> = Vec::new();
     for &name in options.engines.iter().filter(|&&name| name != EngineName::Raypack) {
@@ -149,6 +151,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             hardware_threads: machine::hardware_threads(),
             isa: ours.isa(),
             raypack: ours.version(),
+            accuracy: options.accuracy,
             build: machine::build_profile(),
             engines: engines
                 .iter()
@@ -244,6 +247,7 @@ fn race_kind(
             rays: kind,
             threads,
             isa: engines[engine].isa(),
+            accuracy: engines[engine].accuracy(),
             mrays_per_s: speed.median,
             low: speed.low,
             high: speed.high,

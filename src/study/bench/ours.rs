@@ -5,7 +5,7 @@
 
 use super::engine::{Contender, Engine, Lot, Results, collect};
 use crate::error::Result;
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::simd::Isa;
@@ -25,9 +25,9 @@ impl Ours {
     ///
     /// # Errors
     /// Nothing can be built from the mesh.
-    pub fn new(mesh: &Mesh, params: &BuildParams, isa: Isa) -> Result<Self> {
+    pub fn new(mesh: &Mesh, params: &BuildParams, isa: Isa, accuracy: Accuracy) -> Result<Self> {
         let start = Instant::now();
-        let accel = Accel::build(mesh, params)?.with_isa(isa);
+        let accel = Accel::build(mesh, params)?.with_isa(isa).with_accuracy(accuracy);
         let build_seconds = start.elapsed().as_secs_f64();
         let bytes = accel.stats().bytes() as u64;
         Ok(Self { accel, build_seconds, bytes })
@@ -58,6 +58,10 @@ impl Engine for Ours {
 
     fn isa(&self) -> String {
         self.accel.isa().name().into()
+    }
+
+    fn accuracy(&self) -> Option<Accuracy> {
+        Some(self.accel.accuracy())
     }
 
     /// Every kernel is reported: how far the kernels lie apart is what a reader wants to see.

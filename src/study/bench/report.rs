@@ -1,6 +1,7 @@
 //! The bench's report, as its JSON has it.
 
 use super::agreement::Agreement;
+use crate::geometry::Accuracy;
 use crate::study::rays::RayKind;
 use serde::Serialize;
 
@@ -32,6 +33,8 @@ pub struct Header {
     pub isa: String,
     /// raypack's version.
     pub raypack: String,
+    /// How raypack decided hits.
+    pub accuracy: Accuracy,
     /// `release` or `dev`.
     pub build: &'static str,
     /// The engines.
@@ -72,6 +75,9 @@ pub struct Row {
     pub threads: usize,
     /// The engine's instruction set.
     pub isa: String,
+    /// How raypack decided hits; rivals have no such modes, or have them in the mode's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Accuracy>,
     /// Million rays a second, median over the rounds.
     pub mrays_per_s: f64,
     /// The slowest round.

@@ -15,6 +15,9 @@ impl fmt::Display for Report {
         let engines: Vec<String> =
             h.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
         writeln!(f, "{}, {}", engines.join(", "), h.date)?;
+        if h.engines.iter().any(|e| e.name == "raypack") {
+            writeln!(f, "raypack's accuracy: {}", h.accuracy)?;
+        }
         writeln!(f, "\nMillion rays a second, median of the rounds; the best mode of each engine\n")?;
         write!(f, "{}", grid(&self.summary()))?;
         writeln!(f, "\nEvery mode that ran\n")?;
