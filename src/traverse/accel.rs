@@ -11,17 +11,19 @@ use crate::kdtree::{BuildParams, BuildProgress, KdTree, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa, Simd, Task};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// A mesh made ready for tracing: its tree, and the instruction set to trace with.
 ///
-/// Shared freely between threads: tracing changes nothing.
-#[derive(Debug)]
+/// Shared freely between threads: tracing changes nothing. Clones share the tree, so that it can be traced
+/// with several instruction sets and accuracies side by side.
+#[derive(Clone, Debug)]
 pub struct Accel {
-    tree: KdTree,
+    tree: Arc<KdTree>,
     chosen: Chosen,
     accuracy: Accuracy,
     /// The fast test's records, empty until that mode is chosen.
-    projected: Vec<Projected>,
+    projected: Arc<[Projected]>,
 }
 
 impl Accel {
@@ -43,7 +45,8 @@ impl Accel {
 
     /// Wraps a tree, to be traced with the best instruction set that the machine has.
     pub fn of_tree(tree: KdTree) -> Self {
-        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default(), projected: Vec::new() }
+        let tree = Arc::new(tree);
+        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default(), projected: Arc::default() }
     }
 
     /// The same, traced with another instruction set. Panics if this machine lacks it.
@@ -72,7 +75,7 @@ impl Accel {
     /// bytes a triangle, which stay.
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
         if accuracy == Accuracy::Fast && self.projected.is_empty() {
-            self.projected = self.tree.triangles().par_iter().map(Projected::new).collect();
+            self.projected = self.tree.triangles().par_iter().map(Projected::new).collect::<Vec<_>>().into();
         }
         self.accuracy = accuracy;
     }
@@ -113,7 +116,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        let (tree, active) = (&self.tree, active & lanes_of(W));
+        let (tree, active) = (&*self.tree, active & lanes_of(W));
         match self.accuracy {
             Accuracy::Fast => {
                 self.chosen.run(IntersectPacket::<W, Fast> { tree, records: &self.projected, rays, active })
@@ -136,7 +139,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        let (tree, active) = (&self.tree, active & lanes_of(W));
+        let (tree, active) = (&*self.tree, active & lanes_of(W));
         match self.accuracy {
             Accuracy::Fast => {
                 self.chosen.run(OccludedPacket::<W, Fast> { tree, records: &self.projected, rays, active })

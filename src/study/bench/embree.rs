@@ -16,7 +16,7 @@ use crate::simd::Isa;
 use crate::study::peers::embree::{Build, Coherence, Device, PacketHits, Prepared, Scene};
 use std::sync::Arc;
 
-/// Embree with its three scenes built.
+/// Embree with its scenes built.
 #[derive(Debug)]
 pub struct Embree {
     device: Arc<Device>,
@@ -24,14 +24,15 @@ pub struct Embree {
 }
 
 impl Embree {
-    /// Loads the library and builds with all threads. `isa` holds it to an instruction set.
+    /// Loads the library and builds with all threads, a scene for each of `builds`. `isa` holds it to an
+    /// instruction set.
     ///
     /// # Errors
     /// Embree is not here, or fails.
-    pub fn new(mesh: &Mesh, isa: Option<Isa>) -> Result<Self> {
+    pub fn new(mesh: &Mesh, isa: Option<Isa>, builds: &[Build]) -> Result<Self> {
         let device = Device::new(0, isa)?;
         let scenes =
-            Build::ALL.into_iter().map(|build| Scene::new(&device, mesh, build)).collect::<Result<_>>()?;
+            builds.iter().map(|&build| Scene::new(&device, mesh, build)).collect::<Result<_>>()?;
         Ok(Self { device, scenes })
     }
 

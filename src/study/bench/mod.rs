@@ -18,16 +18,16 @@
 
 pub mod agreement;
 #[cfg(feature = "peers")]
-mod embree;
-mod engine;
-mod machine;
+pub(super) mod embree;
+pub(super) mod engine;
+pub(super) mod machine;
 #[cfg(feature = "peers")]
 mod obvhs;
-mod ours;
-mod race;
+pub(super) mod ours;
+pub(super) mod race;
 mod report;
 mod schedule;
-mod table;
+pub(super) mod table;
 
 pub use agreement::Agreement;
 pub use engine::Results;
@@ -41,6 +41,8 @@ use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::scene::Camera;
 use crate::simd::Isa;
+#[cfg(feature = "peers")]
+use crate::study::peers::embree::Build;
 use crate::study::rays::{RayKind, RaySets, Setup};
 use crate::traverse::Kernel;
 use engine::{CHUNK, Engine};
@@ -198,7 +200,7 @@ fn check(options: &Options) -> Result<()> {
 fn peer(name: EngineName, mesh: &Mesh, options: &Options) -> Result<Box<dyn Engine>> {
     Ok(match name {
         EngineName::Embree => {
-            Box::new(embree::Embree::new(mesh, options.hold_peers_to_isa.then_some(options.isa))?)
+            Box::new(embree::Embree::new(mesh, options.hold_peers_to_isa.then_some(options.isa), &Build::ALL)?)
         }
         _ => Box::new(obvhs::Obvhs::new(mesh)),
     })

@@ -29,8 +29,13 @@ impl Ours {
         let start = Instant::now();
         let accel = Accel::build(mesh, params)?.with_isa(isa).with_accuracy(accuracy);
         let build_seconds = start.elapsed().as_secs_f64();
+        Ok(Self::of_accel(accel, build_seconds))
+    }
+
+    /// The same with a tree that has been built, in so many seconds.
+    pub fn of_accel(accel: Accel, build_seconds: f64) -> Self {
         let bytes = accel.stats().bytes() as u64;
-        Ok(Self { accel, build_seconds, bytes })
+        Self { accel, build_seconds, bytes }
     }
 
     /// The built tree.

@@ -99,7 +99,7 @@ impl Report {
 }
 
 /// Three digits that matter.
-fn figure(mrays: f64) -> String {
+pub fn figure(mrays: f64) -> String {
     match mrays {
         m if m >= 100.0 => format!("{m:.0}"),
         m if m >= 10.0 => format!("{m:.1}"),
@@ -113,7 +113,7 @@ fn verdict(ratio: f64) -> String {
 }
 
 /// Columns as wide as their widest cell; numbers to the right.
-fn grid(lines: &[Vec<String>]) -> String {
+pub fn grid(lines: &[Vec<String>]) -> String {
     let columns = lines.first().map_or(0, Vec::len);
     let width = |c: usize| lines.iter().filter_map(|l| l.get(c)).map(|cell| cell.chars().count()).max();
     let widths: Vec<usize> = (0..columns).map(|c| width(c).unwrap_or(0)).collect();
