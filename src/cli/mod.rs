@@ -3,6 +3,7 @@
 //! Reports go to standard output, everything else to standard error. Failures are one line there,
 //! `raypack: error: …`, and exit code 1; a command line that makes no sense is 2, as usual.
 
+mod accuracy;
 mod bench;
 mod generate;
 mod info;
@@ -34,6 +35,7 @@ enum Command {
     Render(render::Args),
     Info(info::Args),
     Bench(bench::Args),
+    Accuracy(accuracy::Args),
     Generate(generate::Args),
 }
 
@@ -45,6 +47,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Accuracy(args) => accuracy::run(args),
         Command::Generate(args) => generate::run(args),
     };
     match result {

@@ -1,6 +1,6 @@
 //! Options that several commands have.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 
 /// `--accuracy`.
@@ -19,5 +19,16 @@ impl AccuracyOption {
     /// There is no such mode.
     pub fn mode(&self) -> Result<Accuracy> {
         self.accuracy.parse()
+    }
+}
+
+/// A fault of the settings, named by the option instead of the profile's key.
+pub fn as_option(error: Error) -> Error {
+    match error {
+        Error::Option { option, message } => {
+            let option = option.strip_prefix("render.").map_or(option.clone(), |key| format!("--{key}"));
+            Error::Option { option, message }
+        }
+        other => other,
     }
 }

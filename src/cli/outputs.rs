@@ -76,7 +76,7 @@ fn frame_path(picture: &Path, number: u32, frames: Option<u32>) -> PathBuf {
 }
 
 /// Whether two paths name one file, as far as can be known without creating it.
-fn same_file(a: &Path, b: &Path) -> bool {
+pub fn same_file(a: &Path, b: &Path) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 

@@ -3,7 +3,7 @@
 mod report;
 
 use super::model::{Model, Scene};
-use super::options::AccuracyOption;
+use super::options::{AccuracyOption, as_option};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
@@ -184,16 +184,5 @@ impl Args {
         } else {
             Lighting::for_view(camera, &scene.accel)
         }
-    }
-}
-
-/// A fault of the settings, named by the option instead of the profile's key.
-fn as_option(error: Error) -> Error {
-    match error {
-        Error::Option { option, message } => {
-            let option = option.strip_prefix("render.").map_or(option.clone(), |key| format!("--{key}"));
-            Error::Option { option, message }
-        }
-        other => other,
     }
 }

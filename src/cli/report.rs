@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::{check_writable, write_text};
+pub use crate::study::text::grouped;
 use serde::Serialize;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -87,19 +88,6 @@ impl Lines {
     }
 }
 
-/// A number with its thousands set apart: `1,234,567`.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::with_capacity(digits.len() * 4 / 3);
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 /// `1 thing`, `2 things`.
 pub fn counted(number: u64, noun: &str) -> String {
     format!("{} {noun}{}", grouped(number), if number == 1 { "" } else { "s" })
@@ -143,10 +131,6 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
-        assert_eq!(
-            [0, 12, 123, 1234, 123_456, 1_234_567].map(grouped),
-            ["0", "12", "123", "1,234", "123,456", "1,234,567"]
-        );
         assert_eq!(
             (counted(1, "sample"), counted(1000, "sample")),
             ("1 sample".into(), "1,000 samples".into())

@@ -9,4 +9,5 @@ pub mod bench;
 pub mod peers;
 pub mod rays;
 pub mod reference;
+pub(crate) mod text;
 pub mod views;

@@ -31,8 +31,7 @@ impl Embree {
     /// Embree is not here, or fails.
     pub fn new(mesh: &Mesh, isa: Option<Isa>, builds: &[Build]) -> Result<Self> {
         let device = Device::new(0, isa)?;
-        let scenes =
-            builds.iter().map(|&build| Scene::new(&device, mesh, build)).collect::<Result<_>>()?;
+        let scenes = builds.iter().map(|&build| Scene::new(&device, mesh, build)).collect::<Result<_>>()?;
         Ok(Self { device, scenes })
     }
 

@@ -27,7 +27,7 @@ pub(super) mod ours;
 pub(super) mod race;
 mod report;
 mod schedule;
-pub(super) mod table;
+mod table;
 
 pub use agreement::Agreement;
 pub use engine::Results;
@@ -199,9 +199,11 @@ fn check(options: &Options) -> Result<()> {
 #[cfg(feature = "peers")]
 fn peer(name: EngineName, mesh: &Mesh, options: &Options) -> Result<Box<dyn Engine>> {
     Ok(match name {
-        EngineName::Embree => {
-            Box::new(embree::Embree::new(mesh, options.hold_peers_to_isa.then_some(options.isa), &Build::ALL)?)
-        }
+        EngineName::Embree => Box::new(embree::Embree::new(
+            mesh,
+            options.hold_peers_to_isa.then_some(options.isa),
+            &Build::ALL,
+        )?),
         _ => Box::new(obvhs::Obvhs::new(mesh)),
     })
 }

@@ -1,7 +1,8 @@
 //! The report as text: one table of best modes, one of all of them.
 
 use super::report::{Report, Row};
-use std::fmt::{self, Write};
+use crate::study::text::{figure, grid};
+use std::fmt;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -98,41 +99,9 @@ impl Report {
     }
 }
 
-/// Three digits that matter.
-pub fn figure(mrays: f64) -> String {
-    match mrays {
-        m if m >= 100.0 => format!("{m:.0}"),
-        m if m >= 10.0 => format!("{m:.1}"),
-        m => format!("{m:.2}"),
-    }
-}
-
 /// A ratio and what it means for us.
 fn verdict(ratio: f64) -> String {
     format!("{ratio:.2} {}", if ratio >= 1.0 { "won" } else { "lost" })
-}
-
-/// Columns as wide as their widest cell; numbers to the right.
-pub fn grid(lines: &[Vec<String>]) -> String {
-    let columns = lines.first().map_or(0, Vec::len);
-    let width = |c: usize| lines.iter().filter_map(|l| l.get(c)).map(|cell| cell.chars().count()).max();
-    let widths: Vec<usize> = (0..columns).map(|c| width(c).unwrap_or(0)).collect();
-    let mut text = String::new();
-    for (i, line) in lines.iter().enumerate() {
-        let mut row = String::new();
-        for (c, (cell, &width)) in line.iter().zip(&widths).enumerate() {
-            // A heading stands as its column's cells do.
-            let sample = if i == 0 { lines.get(1).and_then(|l| l.get(c)).unwrap_or(cell) } else { cell };
-            let number = sample == "-" || sample.parse::<f64>().is_ok();
-            let gap = if c == 0 { "" } else { "  " };
-            let written =
-                if number { write!(row, "{gap}{cell:>width$}") } else { write!(row, "{gap}{cell:<width$}") };
-            written.expect("writing to a string cannot fail");
-        }
-        text += row.trim_end();
-        text.push('\n');
-    }
-    text
 }
 
 #[cfg(test)]
@@ -140,16 +109,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grids_align() {
-        let lines = [["a", "n", "x"], ["long", "12.5", "y"], ["b", "3", ""]];
-        let lines: Vec<Vec<String>> = lines.iter().map(|l| l.map(String::from).to_vec()).collect();
-        assert_eq!(grid(&lines), "a        n  x\nlong  12.5  y\nb        3\n");
-    }
-
-    #[test]
     fn a_loss_is_called_one() {
         assert_eq!(verdict(0.5), "0.50 lost");
         assert_eq!(verdict(1.25), "1.25 won");
-        assert_eq!([figure(123.4), figure(12.34), figure(1.234)], ["123", "12.3", "1.23"]);
     }
 }
