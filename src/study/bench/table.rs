@@ -1,13 +1,14 @@
 //! The report as text: one table of best modes, one of all of them.
 
 use super::report::{Report, Row};
-use crate::study::text::{figure, grid};
+use crate::study::text::{figure, grid, grouped};
 use std::fmt;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let h = &self.header;
-        writeln!(f, "{}: {} triangles, camera {}, {} x {}", h.model, h.triangles, h.camera, h.size, h.size)?;
+        let triangles = grouped(h.triangles as u64);
+        writeln!(f, "{}: {triangles} triangles, camera {}, {} x {}", h.model, h.camera, h.size, h.size)?;
         writeln!(
             f,
             "{}, {} hardware threads, {} build, seed {}",

@@ -111,7 +111,7 @@ pub fn race(
             FrameRow::new(setting, view.accel.isa(), options.size, &stats, Times::of(seconds), error)
         })
         .collect();
-    let points: Vec<(f64, f64)> = rows.iter().map(|row| (row.ms, row.error.rmse)).collect();
+    let points: Vec<(f64, f64)> = rows.iter().map(|row| (row.ms, row.error.two_digits())).collect();
     for (row, pareto) in rows.iter_mut().zip(pareto::front(&points)) {
         row.pareto = pareto;
     }

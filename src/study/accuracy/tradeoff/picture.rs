@@ -29,6 +29,14 @@ pub struct PictureError {
     pub ssimulacra2: f64,
 }
 
+impl PictureError {
+    /// The RMSE in two significant digits. Pictures of the same samples differ in those beyond by chance:
+    /// which side of an edge a last bit puts a ray on.
+    pub fn two_digits(&self) -> f64 {
+        format!("{:.1e}", self.rmse).parse().expect("what was written can be read")
+    }
+}
+
 /// A picture to compare others with.
 pub struct Judge {
     frame: Frame,
@@ -116,6 +124,12 @@ mod tests {
     fn light_beyond_the_display_is_cut_off() {
         let white = Judge::new(frame(|_, _| [1.0; 3]));
         assert_eq!(white.error(&frame(|_, _| [7.0; 3])).rmse, 0.0);
+    }
+
+    #[test]
+    fn two_digits_decide() {
+        let digits = |rmse| PictureError { rmse, psnr: None, ssimulacra2: 0.0 }.two_digits();
+        assert_eq!([0.012_49, 0.099_9, 0.0].map(digits), [0.012, 0.1, 0.0]);
     }
 
     #[test]

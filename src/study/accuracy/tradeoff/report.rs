@@ -167,7 +167,7 @@ pub struct FrameRow {
     /// How far the picture is from the reference.
     #[serde(flatten)]
     pub error: PictureError,
-    /// Whether no other setting is both quicker and nearer to the reference by its RMSE.
+    /// Whether no other setting is quicker with an RMSE no greater, in two significant digits.
     pub pareto: bool,
 }
 

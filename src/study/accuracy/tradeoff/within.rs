@@ -1,8 +1,7 @@
 //! The most accurate setting that fits a frame time.
 //!
 //! Settings are ranked by the picture's RMSE in two significant digits; where these are equal, the stricter
-//! mode is the more accurate one, and of one mode the quicker setting stands first. (The digits beyond are
-//! chance: which side of a pixel's edge a last bit puts a sample on.)
+//! mode is the more accurate one, and of one mode the quicker setting stands first.
 //!
 //! The first of the ranking whose median fits is tried again by itself, frame after frame, since a race
 //! leaves the caches full of other modes' trees. If it does not fit there, the next one is tried.
@@ -34,8 +33,7 @@ fn choose(
 ) -> Result<Within> {
     let mut ranked: Vec<&FrameRow> = frames.iter().collect();
     ranked.sort_by(|a, b| {
-        let place = |row: &FrameRow| two_digits(row.error.rmse);
-        let by_error = place(a).total_cmp(&place(b));
+        let by_error = a.error.two_digits().total_cmp(&b.error.two_digits());
         by_error.then(b.accuracy.cmp(&a.accuracy)).then(a.ms.total_cmp(&b.ms))
     });
     let budget_ms = budget * 1e3;
@@ -52,11 +50,6 @@ fn choose(
     let quickest = ranked.iter().min_by(|a, b| a.ms.total_cmp(&b.ms)).expect("there is a setting");
     let picked = Choice::measured(quickest, measure(quickest.setting())?);
     Ok(Within { budget_ms, fits: false, picked, next: None })
-}
-
-/// Rounded to two significant digits.
-fn two_digits(x: f64) -> f64 {
-    format!("{x:.1e}").parse().expect("what was written can be read")
 }
 
 #[cfg(test)]
@@ -134,12 +127,5 @@ mod tests {
     #[test]
     fn where_nothing_fits_the_quickest_is_named() {
         assert_eq!(pick(5.0, 1.0), (false, setting(Fast, 1), None));
-    }
-
-    #[test]
-    fn two_digits_decide() {
-        assert_eq!(two_digits(0.012_49), 0.012);
-        assert_eq!(two_digits(0.099_9), 0.1);
-        assert_eq!(two_digits(0.0), 0.0);
     }
 }

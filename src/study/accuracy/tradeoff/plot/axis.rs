@@ -73,7 +73,7 @@ pub struct ErrorAxis {
 }
 
 /// The part of the axis that belongs to the place for none.
-const ZERO_BAND: f64 = 0.16;
+const ZERO_BAND: f64 = 0.36;
 
 impl ErrorAxis {
     /// An axis for errors of which `least` is the smallest that can be told from none; infinite where any

@@ -8,6 +8,7 @@ use plotters::backend::DrawingBackend;
 const TICK_SIZE: f64 = 11.0;
 const LABEL_SIZE: f64 = 12.0;
 const MARK: f64 = 4.5;
+const RING: f64 = 8.0;
 
 /// A point's form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +44,7 @@ pub struct Panel {
     pub time: Axis,
     pub error: ErrorAxis,
     pub points: Vec<Point>,
-    /// Points that belong together, by their numbers.
+    /// Points that belong together, by their numbers; with such lines the front is not drawn.
     pub lines: Vec<Vec<usize>>,
 }
 
@@ -62,7 +63,9 @@ impl Panel {
         canvas.text(&self.title, (middle, area.top + 16.0), 15.0, Ink::Text, Anchor::Middle)?;
         canvas.text(&self.subtitle, (middle, area.top + 34.0), TICK_SIZE, Ink::Faint, Anchor::Middle)?;
         self.axes(canvas, inner)?;
-        self.front(canvas, inner)?;
+        if self.lines.is_empty() {
+            self.front(canvas, inner)?;
+        }
         for line in &self.lines {
             let places: Vec<(f64, f64)> = line.iter().map(|&i| self.place(inner, &self.points[i])).collect();
             if let (Some(&first), true) = (line.first(), places.len() > 1) {
@@ -133,15 +136,32 @@ impl Panel {
                 }
             }
             if point.default {
-                canvas.ring((px, py), MARK + 3.5, point.ink)?;
+                canvas.ring((px, py), RING, point.ink)?;
             }
         }
-        let mut labels = Labels::new(inner, LABEL_SIZE, &places, MARK + 2.0);
+        let mut labels = self.obstacles(inner, &places);
         for (point, &place) in self.points.iter().zip(&places).filter(|(point, _)| !point.label.is_empty()) {
             let placed = labels.place(&point.label, place);
+            if let Some(end) = placed.leader {
+                canvas.line(&[place, end], 1.0, point.ink)?;
+            }
             canvas.text(&point.label, placed.at, LABEL_SIZE, point.ink, placed.anchor)?;
         }
         Ok(())
+    }
+
+    /// What labels must not cover.
+    fn obstacles(&self, inner: Area, places: &[(f64, f64)]) -> Labels {
+        let mut labels = Labels::new(inner, LABEL_SIZE);
+        for (point, &place) in self.points.iter().zip(places) {
+            labels.avoid(place, if point.default { RING } else { MARK } + 2.0);
+            let [low, high] = [point.spread.0, point.spread.1].map(|time| x(inner, self.time.place(time)));
+            labels.avoid_line((low, place.1), (high, place.1));
+        }
+        for line in &self.lines {
+            line.windows(2).for_each(|pair| labels.avoid_line(places[pair[0]], places[pair[1]]));
+        }
+        labels
     }
 }
 
