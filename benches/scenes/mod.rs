@@ -67,6 +67,9 @@ fn models(folder: &Path) -> Vec<Scene> {
 
 /// Criterion's settings for a suite that runs in minutes.
 pub fn quick() -> criterion::Criterion {
+    // Criterion's plots are drawn by the same plotters, which has the fonts that it is given.
+    #[cfg(feature = "accuracy")]
+    raypack::study::accuracy::tradeoff::plot::register_font();
     use std::time::Duration;
     criterion::Criterion::default()
         .sample_size(10)

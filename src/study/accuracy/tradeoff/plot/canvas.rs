@@ -12,7 +12,8 @@ use std::sync::Once;
 
 const FAMILY: &str = "sans-serif";
 
-/// Has bitmaps write with the font that is compiled in.
+/// Gives plotters DejaVu Sans for "sans-serif": without a font it draws no text into bitmaps, and measures none.
+/// [`write`](super::write) does so by itself; other users of plotters in a process have need of it too.
 pub fn register_font() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -52,7 +53,8 @@ pub enum Ink {
     Fast,
     Watertight,
     Exact,
-    Rival,
+    RivalFast,
+    RivalRobust,
 }
 
 impl Ink {
@@ -65,6 +67,11 @@ impl Ink {
         }
     }
 
+    /// The colour of Embree's mode of that name.
+    pub fn of_rival(mode: &str) -> Self {
+        if mode == "fast" { Self::RivalFast } else { Self::RivalRobust }
+    }
+
     const fn rgb(self) -> RGBColor {
         match self {
             Self::Text => RGBColor(30, 30, 30),
@@ -74,7 +81,8 @@ impl Ink {
             Self::Fast => RGBColor(213, 94, 0),
             Self::Watertight => RGBColor(0, 114, 178),
             Self::Exact => RGBColor(0, 135, 98),
-            Self::Rival => RGBColor(110, 80, 120),
+            Self::RivalFast => RGBColor(160, 95, 165),
+            Self::RivalRobust => RGBColor(85, 50, 100),
         }
     }
 }

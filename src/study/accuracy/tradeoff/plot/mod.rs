@@ -12,6 +12,8 @@ mod canvas;
 mod labels;
 mod panel;
 
+pub use canvas::register_font;
+
 use super::report::{FrameRow, RayRow, Report};
 use crate::error::{Error, Result};
 use crate::files::{write_text, write_whole};
@@ -79,7 +81,7 @@ pub fn write(path: &Path, report: &Report) -> Result<()> {
             write_text(path, &text)
         }
         Format::Png => {
-            canvas::register_font();
+            register_font();
             let (width, height) = (size.0 * PNG_SCALE, size.1 * PNG_SCALE);
             let mut bytes = vec![0; (width * height * 3) as usize];
             let area = BitMapBackend::with_buffer(&mut bytes, (width, height)).into_drawing_area();
@@ -159,7 +161,7 @@ fn ray_panel(report: &Report, kind: RayKind) -> Panel {
             spread: (row.ns_low, row.ns_high),
             error: row.per_million.total,
             label: if ours { row.mode.into() } else { format!("Embree {}", row.mode) },
-            ink: if ours { Ink::of_mode(row.mode) } else { Ink::Rival },
+            ink: if ours { Ink::of_mode(row.mode) } else { Ink::of_rival(row.mode) },
             mark: if ours { Mark::Circle } else { Mark::Square },
             default: row.default,
             front: row.pareto,
