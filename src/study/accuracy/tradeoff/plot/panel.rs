@@ -63,8 +63,8 @@ impl Panel {
         canvas.text(&self.title, (middle, area.top + 16.0), 15.0, Ink::Text, Anchor::Middle)?;
         canvas.text(&self.subtitle, (middle, area.top + 34.0), TICK_SIZE, Ink::Faint, Anchor::Middle)?;
         self.axes(canvas, inner)?;
-        if self.lines.is_empty() {
-            self.front(canvas, inner)?;
+        for [from, to] in self.front(inner) {
+            canvas.dashes(from, to, Ink::Faint)?;
         }
         for line in &self.lines {
             let places: Vec<(f64, f64)> = line.iter().map(|&i| self.place(inner, &self.points[i])).collect();
@@ -109,17 +109,17 @@ impl Panel {
         canvas.upward(&self.error_label, (inner.left - 60.0, half), LABEL_SIZE, Ink::Text)
     }
 
-    /// The front as steps: what any point on it beats lies above and to the right.
-    fn front<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>, inner: Area) -> Drawn {
-        let on_front = self.points.iter().filter(|p| p.front);
+    /// The front as steps: what any point on it beats lies above and to the right. None where lines say
+    /// enough.
+    fn front(&self, inner: Area) -> Vec<[(f64, f64); 2]> {
+        let on_front = self.points.iter().filter(|p| p.front && self.lines.is_empty());
         let mut places: Vec<(f64, f64)> = on_front.map(|p| self.place(inner, p)).collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for pair in places.windows(2) {
+        let step = |pair: &[(f64, f64)]| {
             let corner = (pair[1].0, pair[0].1);
-            canvas.dashes(pair[0], corner, Ink::Faint)?;
-            canvas.dashes(corner, pair[1], Ink::Faint)?;
-        }
-        Ok(())
+            [[pair[0], corner], [corner, pair[1]]]
+        };
+        places.windows(2).flat_map(step).collect()
     }
 
     fn marks<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>, inner: Area) -> Drawn {
@@ -144,6 +144,7 @@ impl Panel {
             let placed = labels.place(&point.label, place);
             if let Some(end) = placed.leader {
                 canvas.line(&[place, end], 1.0, point.ink)?;
+                labels.avoid_line(place, end);
             }
             canvas.text(&point.label, placed.at, LABEL_SIZE, point.ink, placed.anchor)?;
         }
@@ -157,6 +158,9 @@ impl Panel {
             labels.avoid(place, if point.default { RING } else { MARK } + 2.0);
             let [low, high] = [point.spread.0, point.spread.1].map(|time| x(inner, self.time.place(time)));
             labels.avoid_line((low, place.1), (high, place.1));
+        }
+        for [from, to] in self.front(inner) {
+            labels.avoid_line(from, to);
         }
         for line in &self.lines {
             line.windows(2).for_each(|pair| labels.avoid_line(places[pair[0]], places[pair[1]]));
