@@ -6,29 +6,41 @@
 //! barycentrics, where its error is a few ulps, and move it along the geometric normal by a
 //! multiple of that error. So do we; but where they count ulps of each coordinate of the point,
 //! and go over to a fixed length near the coordinate planes (which ties the method to scenes of
-//! metres), we count ulps of the triangle's greatest coordinate. That is what bounds the error of
-//! both the point and the intersection test, and it has no scale built in.
+//! metres), we count ulps of the triangle's greatest coordinate and of its extent. Those bound the errors
+//! of the point and of the intersection test, and have no scale built in.
 
 use crate::geometry::triangle::Corners;
 use glam::Vec3;
 
-/// The step in units of the triangle's greatest coordinate: 128 roundings of 2^-24.
+/// The step in units of the triangle's greatest coordinate: 24 roundings of 2^-24.
 ///
-/// The point is off by at most some 5 roundings, the watertight test by some 16 of the distance
-/// between origin and corner, which is at most twice the greatest coordinate.
-const STEP: f32 = 128.0 / (1 << 24) as f32;
+/// The point is off by some 3 roundings, and by one more once it has moved; a plane through it is
+/// computed to some 4 roundings of the distance to its corners, which is at most twice the greatest
+/// coordinate.
+const PLACE: f32 = 24.0 / (1 << 24) as f32;
+
+/// The step in units of the triangle's extent: the test is off by up to 32 roundings of the distance
+/// to its corners.
+const EXTENT: f32 = 104.0 / (1 << 24) as f32;
 
 /// The point of a triangle with the barycentric weights `u` (of the second corner) and `v` (of
 /// the third), moved off the surface along the unit vector `normal`.
 ///
 /// The result is the same for either direction in which a ray came; `normal` says which side is
-/// meant. It moves by no more than `2^-16` of the greatest coordinate of the triangle.
+/// meant. It moves by no more than `2^-16` of the greatest coordinate of the triangle and of its
+/// extent, whichever is more.
+///
+/// Where two surfaces meet at less than a right angle, a point that is about that near to their edge
+/// may come out behind the other one: no step along one normal can help that.
 #[inline(always)]
 pub fn offset_point([p0, p1, p2]: &Corners, u: f32, v: f32, normal: Vec3) -> Vec3 {
     let [p0, p1, p2] = [*p0, *p1, *p2].map(Vec3::from_array);
-    let point = p0 * (1.0 - u - v) + p1 * u + p2 * v;
+    // Along the edges, so that a small triangle far away is rounded once only.
+    let (e1, e2) = (p1 - p0, p2 - p0);
+    let point = p0 + (e1 * u + e2 * v);
     let greatest = p0.abs().max(p1.abs()).max(p2.abs()).max_element();
-    point + normal * (greatest * STEP)
+    let extent = e1.abs().max(e2.abs()).max_element();
+    point + normal * (greatest * PLACE + extent * EXTENT)
 }
 
 #[cfg(test)]

@@ -85,8 +85,9 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
             let id = primitive[lane] as u32;
             let record = &records[id as usize];
             let normal = triangle::normal(tree.corners(id));
-            hits.t[lane] = t[lane];
-            [hits.u[lane], hits.v[lane]] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
+            // A zero is given out without a sign.
+            let [u, v] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
+            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t[lane] + 0.0, u + 0.0, v + 0.0);
             hits.primitive[lane] = id;
             for axis in 0..3 {
                 hits.normal[axis][lane] = normal[axis];

@@ -163,8 +163,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
         inside = inside & (sum.lt(zero) | zero.lt(sum));
 
         let t = self.distance(corners, inside, &[az, bz, cz]);
-        let inverse = L::splat(1.0) / sum;
-        Candidate { inside, t, u: b * inverse, v: c * inverse }
+        // No reciprocal: that of a denormal sum would be infinite.
+        Candidate { inside, t, u: b / sum, v: c / sum }
     }
 }
 
