@@ -57,8 +57,8 @@ pub struct Census {
 
 /// Counts. `progress` is told, a line at a time, what is about to happen.
 ///
-/// All engines are asked the same rays, eight at a time: neither their packets' width nor the
-/// threads that trace them change an answer.
+/// All engines are asked the same rays, eight at a time, by all threads. (raypack's kernels all give
+/// the same answers; Embree's may differ between widths.)
 ///
 /// # Errors
 /// Nothing can be built from the mesh. Embree's absence is a note, not an error.
@@ -118,7 +118,7 @@ const LARGEST: u32 = 4096;
 fn enough_rays(mesh: &Mesh, accel: &Accel, kind: RayKind, options: &Options) -> Vec<Ray> {
     let bounds = mesh.bounds();
     let camera = options.camera.unwrap_or_else(|| Camera::framing(&bounds, 1.0));
-    let mut size = (options.rays as f64).sqrt().ceil() as u32;
+    let mut size = (options.rays as f64).sqrt().ceil().max(1.0) as u32;
     loop {
         let setup = Setup::new(camera, size.min(LARGEST), bounds, options.seed);
         let closest = |rays: &[Ray]| match answers(accel, Kernel::Packet8, RayKind::Camera, rays) {
