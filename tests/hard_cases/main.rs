@@ -23,10 +23,14 @@ mod meshes;
 mod numbers;
 mod scene;
 
+mod axis_parallel;
 mod degenerate;
 mod grazing;
+mod planes;
+mod shells;
 mod sizes;
 mod slivers;
+mod strange_rays;
 mod watertight;
 
 // The oracle suite uses the rest of it.
