@@ -80,6 +80,11 @@ impl Accel {
         self.accuracy = accuracy;
     }
 
+    /// Bytes of what the chosen accuracies keep beside the tree: none but for [`Accuracy::Fast`].
+    pub fn record_bytes(&self) -> usize {
+        size_of_val(&self.projected[..])
+    }
+
     /// The accuracy in use.
     pub fn accuracy(&self) -> Accuracy {
         self.accuracy

@@ -25,8 +25,13 @@ mod scene;
 
 mod axis_parallel;
 mod degenerate;
+mod garbage;
 mod grazing;
+mod invariance;
 mod planes;
+mod properties;
+mod range;
+mod secondary;
 mod shells;
 mod sizes;
 mod slivers;

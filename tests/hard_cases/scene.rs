@@ -131,7 +131,9 @@ impl Scene {
         Numbers::new(self.seed, 99).shuffle(&mut order);
         let mixed: Vec<Ray> = order.iter().map(|&i| rays[i]).collect();
         let mixed_expected: Vec<Hit> = order.iter().map(|&i| expected[i]).collect();
-        let pinned: Vec<Ray> = mixed.iter().zip(&mixed_expected).map(|(ray, hit)| pinned(ray, hit)).collect();
+        let ordinary = self.is_ordinary(rays);
+        let pin = |(ray, hit)| pinned(ray, hit, ordinary);
+        let pinned: Vec<Ray> = mixed.iter().zip(&mixed_expected).map(pin).collect();
 
         for tree in 0..self.trees.len() {
             self.trees[tree].set_accuracy(accuracy);
@@ -196,10 +198,15 @@ fn any(accel: &Accel, kernel: Kernel, rays: &[Ray]) -> Vec<bool> {
     occluded
 }
 
-/// The same ray with nothing but its hit's `t` in its interval. A `t` that is denormal lost bits when it
-/// was given out.
-fn pinned(ray: &Ray, hit: &Hit) -> Ray {
-    if hit.is_hit() && !hit.t.is_subnormal() { Ray { tnear: hit.t, tfar: hit.t, ..*ray } } else { *ray }
+/// The same ray with nothing but its hit's `t` in its interval. A `t` that is denormal, or was rounded
+/// to the least that is not, lost bits when it was given out; so may have a zero where numbers are not
+/// ordinary.
+fn pinned(ray: &Ray, hit: &Hit, ordinary: bool) -> Ray {
+    if hit.is_hit() && (hit.t > f32::MIN_POSITIVE || (hit.t == 0.0 && ordinary)) {
+        Ray { tnear: hit.t, tfar: hit.t, ..*ray }
+    } else {
+        *ray
+    }
 }
 
 /// A hit as bits, so that equality means identity.

@@ -27,6 +27,8 @@ fn by_test<M: Mode>(mesh: &Mesh, ray: &Ray, record: impl Fn(&[[f32; 3]; 3]) -> M
             best = Hit { t: found.t, u, v, primitive, normal: normal(&corners) };
         }
     }
+    // A zero is given out without a sign.
+    (best.t, best.u, best.v) = (best.t + 0.0, best.u + 0.0, best.v + 0.0);
     best
 }
 

@@ -34,7 +34,7 @@ impl Ours {
 
     /// The same with a tree that has been built, in so many seconds.
     pub fn of_accel(accel: Accel, build_seconds: f64) -> Self {
-        let bytes = accel.stats().bytes() as u64;
+        let bytes = (accel.stats().bytes() + accel.record_bytes()) as u64;
         Self { accel, build_seconds, bytes }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Single precision only sorts out what is missed for certain. What is left is decided in double
 //! precision, lane by lane, and where even that leaves a sign in doubt, by exact arithmetic
-//! ([`determinant`]). So a ray hits a triangle if and only if the half-line and the closed triangle
+//! (`determinant`). So a ray hits a triangle if and only if the half-line and the closed triangle
 //! that the `f32` numbers stand for share exactly one point. `t`, `u` and `v` are quotients of
 //! determinants that are right to some 30 bits before they are rounded: right to the last bit, or
 //! to the one before where the true value lies next to halfway between two floats.

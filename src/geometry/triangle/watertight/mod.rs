@@ -10,7 +10,7 @@
 //! rounding is monotone and the products are rounded alike; where it is zero, double precision
 //! (in which products of two floats are exact) decides. That is why nothing here is fused.
 //!
-//! `t` is not the paper's: see [`distance`].
+//! `t` is not the paper's: see `distance`.
 //!
 //! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
 //! it would only turn all three signs round.
