@@ -96,14 +96,18 @@ impl Polygon {
                 keep(*from);
             }
             if (df > 0.0 && dt < 0.0) || (df < 0.0 && dt > 0.0) {
-                keep(self.crossing(from, to, df / (df - dt), axis, position));
+                keep(self.crossing(from, to, [df, dt], axis, position));
             }
         }
         (self.vertices, self.count) = (kept, count);
     }
 
-    /// The point at the fraction `s` of the way, which lies on the plane.
-    fn crossing(&self, from: &Vertex, to: &Vertex, s: f64, axis: usize, position: f64) -> Vertex {
+    /// Where the edge between two vertices crosses the plane that they are `distances` away from, on
+    /// opposite sides.
+    fn crossing(&self, from: &Vertex, to: &Vertex, [df, dt]: [f64; 2], axis: usize, position: f64) -> Vertex {
+        let s = df / (df - dt);
+        // An edge nearly parallel to the plane crosses it wherever its ends' errors let it.
+        let slack = (from.error[axis].max(to.error[axis]) / (df - dt).abs()).min(1.0);
         let mut point = NOWHERE;
         for i in 0..3 {
             let (a, b) = (from.at[i], to.at[i]);
@@ -114,7 +118,7 @@ impl Polygon {
                 point.at[i] = a;
             } else {
                 point.at[i] = (a + (b - a) * s).clamp(a.min(b), a.max(b));
-                point.error[i] += self.step_error[i];
+                point.error[i] += self.step_error[i] + (b - a).abs() * slack;
             }
         }
         point

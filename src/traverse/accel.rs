@@ -71,7 +71,7 @@ impl Accel {
         self
     }
 
-    /// Chooses the accuracy. The first choice of [`Accuracy::Fast`] makes that test's records, 40
+    /// Chooses the accuracy. The first choice of [`Accuracy::Fast`] makes that test's records, 44
     /// bytes a triangle, which stay.
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
         if accuracy == Accuracy::Fast && self.projected.is_empty() {

@@ -157,3 +157,39 @@ fn of_many_copies_the_first_is_hit() {
         assert!(hits > 100, "{hits} hits");
     }
 }
+
+/// Three triangles whose coordinates span sixty decades: clipped edges run nearly along planes.
+#[test]
+fn coordinates_of_sixty_decades_make_a_whole_tree() {
+    let mesh = of_triangles(
+        [
+            [
+                [1.17364434e-32, 9304.287, -8.8621675e17],
+                [-3.890362e-6, -2.2713898e26, -5.2122404e-17],
+                [1.8539609e-7, 94231170.0, 7.1314965e35],
+            ],
+            [
+                [1.8539609e-7, 94231170.0, 7.1314965e35],
+                [4.7468106e-8, 9.906747e29, 1.3934823e-36],
+                [9.249948e-17, 290805.28, -9.449688e-33],
+            ],
+            [
+                [-1.5773913e-26, -1.7329934e-35, -1.3738769e34],
+                [4.899812e22, 1.0598657e34, -1.6023515e-9],
+                [2.7760792e-26, -89.54573, 4.2571238e32],
+            ],
+        ]
+        .map(|corners| corners.map(Vec3::from_array)),
+    );
+    let params = BuildParams { traversal_cost: 0.2, min_leaf: 1, ..Default::default() };
+    let accel = Accel::build(&mesh, &params).expect("builds");
+    assert_eq!(accel.tree().validate(), Ok(()));
+
+    let mut numbers = Numbers::new(1, 5);
+    for _ in 0..2000 {
+        let count = 1 + numbers.below(12);
+        let mesh = of_triangles((0..count).map(|_| [0; 3].map(|_: u32| point(&mut numbers, finite))));
+        let accel = Accel::build(&mesh, &params).expect("builds");
+        assert_eq!(accel.tree().validate(), Ok(()), "{mesh:?}");
+    }
+}

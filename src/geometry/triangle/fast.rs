@@ -8,9 +8,9 @@
 //! triangle and wherever it lies:
 //!
 //! - positions are taken relative to a corner, not to the coordinates' origin;
-//! - that corner is the one opposite the longest edge. Its weight is what is left over from the
-//!   other two, so their errors add up in it; and its height is the least, so that they move the
-//!   edge the least.
+//! - that corner is an end of the longest edge, and the second weight follows from the place along
+//!   that edge, which is well defined in a sliver too, where the weights themselves are noise. So a
+//!   point that is taken for inside is never far beyond an end.
 //!
 //! What is given up is agreement between neighbours: each side of a shared edge is decided from its
 //! own numbers, so a ray may slip between the two, or hit both.
@@ -19,18 +19,22 @@ use super::{Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
 use crate::simd::Lanes;
 use glam::{DVec3, Vec3};
 
-/// A triangle made ready: 40 bytes. "Renamed" coordinates are `RENAMED[axis]`.
+/// A triangle made ready: 44 bytes. "Renamed" coordinates are `RENAMED[axis]`, and its corners here
+/// begin with the ends of the longest edge.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Projected {
-    /// The corner opposite the longest edge, renamed.
+    /// The first corner, renamed.
     corner: [f32; 3],
     /// The plane's normal in the first two renamed coordinates; in the third it is 1.
     plane: [f32; 2],
-    /// The weight of the next corner, from the first two renamed coordinates relative to `corner`.
-    u: [f32; 2],
-    /// The weight of the corner after that.
-    v: [f32; 2],
+    /// The place along the longest edge, 0 to 1, from the first two renamed coordinates relative to
+    /// `corner`.
+    along: [f32; 2],
+    /// The weight of the third corner, likewise.
+    across: [f32; 2],
+    /// The place of the third corner along the longest edge.
+    apex: f32,
     /// The axis in which the normal is greatest.
     axis: u16,
     /// Which of the triangle's corners `corner` is.
@@ -41,8 +45,8 @@ impl Projected {
     /// Prepares a triangle. One without area gets NaNs, so that it is never hit.
     pub fn new(corners: &Corners) -> Self {
         let points = corners.map(|corner| Vec3::from_array(corner).as_dvec3());
-        let opposite = |i: usize| (points[(i + 2) % 3] - points[(i + 1) % 3]).length_squared();
-        let first = (1..3).fold(0, |best, i| if opposite(i) > opposite(best) { i } else { best });
+        let edge = |i: usize| (points[(i + 1) % 3] - points[i]).length_squared();
+        let first = (1..3).fold(0, |best, i| if edge(i) > edge(best) { i } else { best });
         let [p0, p1, p2] = [0, 1, 2].map(|i| points[(first + i) % 3]);
 
         let normal = normal_in_double(corners);
@@ -56,12 +60,15 @@ impl Projected {
         };
         let [i, j, k] = RENAMED[axis];
         let n: DVec3 = normal / normal[k];
-        let (e1, e2) = ((p1 - p0) / normal[k], (p2 - p0) / normal[k]);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let base = e1 / e1.length_squared();
         Self {
             corner: [i, j, k].map(|c| p0[c] as f32),
             plane: [n[i] as f32, n[j] as f32],
-            u: [e2[j] as f32, -e2[i] as f32],
-            v: [-e1[j] as f32, e1[i] as f32],
+            // In the plane the third coordinate is -(n[i] x + n[j] y).
+            along: [(base[i] - base[k] * n[i]) as f32, (base[j] - base[k] * n[j]) as f32],
+            across: [(-e1[j] / normal[k]) as f32, (e1[i] / normal[k]) as f32],
+            apex: base.dot(e2) as f32,
             axis: axis as u16,
             first: first as u16,
         }
@@ -103,8 +110,9 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
 
         // Where in the triangle that is.
         let (x, y) = (oi + t * di, oj + t * dj);
-        let u = L::splat(triangle.u[0]) * x + L::splat(triangle.u[1]) * y;
-        let v = L::splat(triangle.v[0]) * x + L::splat(triangle.v[1]) * y;
+        let along = L::splat(triangle.along[0]) * x + L::splat(triangle.along[1]) * y;
+        let v = L::splat(triangle.across[0]) * x + L::splat(triangle.across[1]) * y;
+        let u = along - v * L::splat(triangle.apex);
         let inside = zero.le(u) & zero.le(v) & (u + v).le(one);
         Candidate { inside, t, u, v }
     }

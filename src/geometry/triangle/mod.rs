@@ -2,7 +2,7 @@
 //!
 //! | file | what decides whether the ray hits | what it costs |
 //! |---|---|---|
-//! | `fast` | the point where it meets the plane, in single precision | a record of 40 bytes a triangle |
+//! | `fast` | the point where it meets the plane, in single precision | a record of 44 bytes a triangle |
 //! | `watertight` | signs of edge functions that neighbours compute alike | |
 //! | `exact` | signs of exact determinants | double precision for each likely hit |
 //!
