@@ -18,7 +18,7 @@ fn every_shell_is_met_in_its_turn() {
         for seed in seeds() {
             let mut scene = Scene::new(name, seed, joined(&shells));
             let mut numbers = Numbers::new(seed, 1);
-            let rays: Vec<Ray> = (0..150)
+            let rays: Vec<Ray> = (0..60)
                 .map(|i| match i % 2 {
                     0 => Ray::new(numbers.vector() * 0.3, numbers.direction()),
                     // Through corners of every shell.

@@ -30,7 +30,7 @@ fn closed_surfaces_of_slivers_stay_closed() {
         for seed in seeds() {
             let mut scene = Scene::new(&closed.name, seed, closed.mesh.clone());
             let mut numbers = Numbers::new(seed, 1);
-            let rays: Vec<Ray> = (0..1200)
+            let rays: Vec<Ray> = (0..200)
                 .map(|_| match numbers.below(2) {
                     // From outside, rays would pass the core by: it is thinner than the distance's rounding.
                     0 => Ray::new(closed.inside(&mut numbers), numbers.direction()),
