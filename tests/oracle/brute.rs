@@ -24,7 +24,9 @@ fn by_test<M: Mode>(mesh: &Mesh, ray: &Ray, record: impl Fn(&[[f32; 3]; 3]) -> M
         let found = test.test(&record, true);
         if found.inside && found.t >= ray.tnear && found.t <= ray.tfar && found.t < best.t {
             let [u, v] = M::Test::<1, f32>::weights(&record, found.u, found.v);
-            best = Hit { t: found.t, u, v, primitive, normal: normal(&corners) };
+            // As the kernels do: a zero is given out without a sign.
+            let (t, u, v) = (found.t + 0.0, u + 0.0, v + 0.0);
+            best = Hit { t, u, v, primitive, normal: normal(&corners) };
         }
     }
     // A zero is given out without a sign.
