@@ -44,6 +44,7 @@
 //! | [`traverse`] | the kernels that take rays through a tree |
 //! | [`scene`] | camera, camera paths, lights |
 //! | [`render`] | tiles, their scheduler, shading, pictures |
+//! | [`batch`] | rays in bulk on all processors, and NumPy's files of them |
 //! | [`profile`] | every tunable in one file |
 //! | [`study`] | measurements: rays per second beside other engines, errors against exact answers |
 //! | `cli` | the `raypack` command (feature `cli`) |
@@ -56,6 +57,7 @@
 //! parameter are closed. Of several hits at the same distance the lowest primitive id wins.
 //! Every kernel on every instruction set gives the same answer, to the bit.
 
+pub mod batch;
 pub mod error;
 pub mod files;
 pub mod geometry;

@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod bench;
+mod cast;
 mod generate;
 mod info;
 mod model;
@@ -36,6 +37,7 @@ enum Command {
     Info(info::Args),
     Bench(bench::Args),
     Accuracy(accuracy::Args),
+    Cast(cast::Args),
     Generate(generate::Args),
 }
 
@@ -48,6 +50,7 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Accuracy(args) => accuracy::run(args),
+        Command::Cast(args) => cast::run(args),
         Command::Generate(args) => generate::run(args),
     };
     match result {

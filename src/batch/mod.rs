@@ -1,0 +1,139 @@
+//! Rays in bulk: traced by all processors, and read from and written to NumPy's files.
+//!
+//! ```
+//! use raypack::Vec3;
+//! use raypack::batch::Batch;
+//! use raypack::geometry::{Hit, Ray};
+//! use raypack::kdtree::BuildParams;
+//! use raypack::mesh::Mesh;
+//! use raypack::traverse::Accel;
+//!
+//! let mesh = Mesh {
+//!     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+//!     triangles: vec![[0, 1, 2]],
+//!     ..Mesh::default()
+//! };
+//! let accel = Accel::build(&mesh, &BuildParams::default())?;
+//!
+//! let rays: Vec<Ray> =
+//!     (0..1000).map(|i| Ray::new(Vec3::new(i as f32 * 0.01, 0.25, 1.0), -Vec3::Z)).collect();
+//! let mut hits = vec![Hit::MISS; rays.len()];
+//! Batch::new(&accel, &rays).intersect(&mut hits);
+//! assert_eq!(hits.iter().filter(|hit| hit.is_hit()).count(), 76);
+//! # Ok::<(), raypack::Error>(())
+//! ```
+//!
+//! # What an answer says
+//!
+//! The same as that of [`Accel::intersect`] and [`Accel::occluded`], to the bit, whatever the kernel,
+//! the instruction set and the number of threads; each ray stands for itself.
+//!
+//! - **The interval is closed**: a hit at exactly `tnear` or `tfar` counts. `tfar` may be infinite; an
+//!   empty interval (`tnear > tfar`) is a miss.
+//! - **`t` is counted in lengths of the direction**, which need not be normalised: the point is `origin
+//!   + t * direction`.
+//! - **On an edge or a vertex** that triangles share, several of them have the same `t`; the one with the
+//!   lowest primitive id is reported. (Their `t` may also differ by a rounding; then the least wins.)
+//! - **Both sides of a triangle count.** The normal is `(p1 - p0) x (p2 - p0)`, not normalised, whichever
+//!   side the ray came from: its length is twice the triangle's area.
+//! - **A ray that is none** (a NaN anywhere, an infinite origin or direction, a zero direction) is a miss.
+
+mod choice;
+#[cfg(feature = "numpy")]
+pub mod numpy;
+
+use crate::geometry::{Hit, Ray};
+use crate::render::Workers;
+use crate::traverse::{Accel, Kernel};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Instant;
+
+/// Rays that a worker takes at once: some milliseconds, and a whole number of packets.
+const CHUNK: usize = 4096;
+
+/// Rays to be traced, and how.
+#[derive(Debug)]
+pub struct Batch<'a> {
+    accel: &'a Accel,
+    rays: &'a [Ray],
+    kernel: Option<Kernel>,
+    threads: usize,
+    done: AtomicUsize,
+}
+
+/// How a batch was traced.
+#[derive(Clone, Copy, Debug)]
+pub struct Traced {
+    /// The kernel.
+    pub kernel: Kernel,
+    /// Worker threads: no more than there was work for.
+    pub threads: usize,
+    /// Wall-clock time, the choice of the kernel included.
+    pub seconds: f64,
+}
+
+impl<'a> Batch<'a> {
+    /// A batch to be traced by the kernel that suits it, on all processors.
+    pub fn new(accel: &'a Accel, rays: &'a [Ray]) -> Self {
+        Self { accel, rays, kernel: None, threads: 0, done: AtomicUsize::new(0) }
+    }
+
+    /// The same, traced by `kernel`; `None` for the one that is quickest with a sample of the rays.
+    ///
+    /// Packets are several times quicker if rays that follow one another go the same way, and no
+    /// quicker or slower than single rays if they do not. Answers are the same.
+    pub fn with_kernel(self, kernel: Option<Kernel>) -> Self {
+        Self { kernel, ..self }
+    }
+
+    /// The same, traced by so many threads; 0 for as many as there are processors.
+    pub fn with_threads(self, threads: usize) -> Self {
+        Self { threads, ..self }
+    }
+
+    /// What part of the rays (0 to 1) is done, to be read from another thread.
+    pub fn fraction(&self) -> f64 {
+        self.done.load(Ordering::Relaxed) as f64 / self.rays.len().max(1) as f64
+    }
+
+    /// The closest hit of each ray, [`Hit::MISS`] where there is none. Panics if there are not as many
+    /// `hits` as rays.
+    pub fn intersect(&self, hits: &mut [Hit]) -> Traced {
+        self.trace(hits, Hit::MISS, |kernel, rays, hits| self.accel.intersect_many(kernel, rays, hits))
+    }
+
+    /// Whether anything lies in each ray's interval. Panics if there are not as many answers as rays.
+    pub fn occluded(&self, occluded: &mut [bool]) -> Traced {
+        self.trace(occluded, false, |kernel, rays, answers| self.accel.occluded_many(kernel, rays, answers))
+    }
+
+    fn trace<A: Copy + Send>(
+        &self,
+        answers: &mut [A],
+        none: A,
+        call: impl Fn(Kernel, &[Ray], &mut [A]) + Sync,
+    ) -> Traced {
+        assert_eq!(self.rays.len(), answers.len(), "as many answers as rays");
+        self.done.store(0, Ordering::Relaxed);
+        let start = Instant::now();
+        let threads = match self.threads {
+            0 => thread::available_parallelism().map_or(1, usize::from),
+            threads => threads,
+        };
+        let kernel = self.kernel.unwrap_or_else(|| choice::quickest(self.rays, none, &call));
+        let jobs: Vec<_> = self.rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)).collect();
+        let outcome = Workers { threads: threads.min(jobs.len()), pin: false }.run(
+            jobs,
+            || (),
+            |(), (rays, answers): (&[Ray], &mut [A])| {
+                call(kernel, rays, answers);
+                self.done.fetch_add(rays.len(), Ordering::Relaxed);
+            },
+        );
+        Traced { kernel, threads: outcome.states.len(), seconds: start.elapsed().as_secs_f64() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,224 @@
+//! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
+
+use super::model::{Model, Scene, SceneReport};
+use super::options::{AccuracyOption, as_option};
+use super::outputs::same_file;
+use super::progress::watch;
+use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration, grouped};
+use crate::batch::numpy::{read_rays, write_hits, write_occluded};
+use crate::batch::{Batch, Traced};
+use crate::error::{Error, Result};
+use crate::files::check_writable;
+use crate::geometry::{Accuracy, Hit, Ray};
+use crate::profile::{self, Profile};
+use crate::render::{RayCount, Tuning};
+use crate::simd::Isa;
+use crate::traverse::Kernel;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Trace a batch of rays from a NumPy file and write the hits to another
+///
+/// Rays are the rows of an N x 8 float32 array saved with np.save: origin x, y, z, tnear, direction x, y,
+/// z, tfar. Hits are arrays in a .npz for np.load, one item a ray:
+///
+///   t          float32: where on the ray, in lengths of its direction
+///   u, v       float32: barycentric weights of the triangle's second and third corner
+///   primitive  int64: the triangle's index in the model
+///   geometry   int64: the index of its material, as `raypack info` lists them; 0 without materials
+///   normal     float32, N x 3: (p1 - p0) x (p2 - p0), not normalised, not turned to the ray
+///
+/// A miss has t = inf, primitive = geometry = -1, and zeros. With --any there is one array:
+///
+///   occluded   bool: whether anything lies in the ray's interval
+///
+/// The interval from tnear to tfar is closed: hits at its very ends count; tfar may be inf. Directions
+/// need not be normalised: the point of a hit is origin + t * direction. Both sides of a triangle count.
+/// Of several hits with the same t, as on an edge or a vertex that triangles share, the one with the
+/// lowest primitive is reported. A ray with a NaN in it, with an infinite origin or direction, with a
+/// zero direction or an empty interval (tnear > tfar) is a miss. Answers do not depend on --threads,
+/// --packet or the instruction set, to the bit; RAYPACK_ISA=portable|avx2|avx512 forces one.
+///
+/// Any byte order and both array orders (C and Fortran) are read; N may be 0. Beside the model and its
+/// tree, a ray takes 60 bytes of memory, 33 with --any. Triangles count as the reader keeps them: `raypack
+/// info` says what it dropped or split.
+#[derive(Clone, Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// The model: .obj or .ply
+    scene: PathBuf,
+    /// The rays: a .npy file of N x 8 float32
+    #[arg(long, value_name = "FILE")]
+    rays: PathBuf,
+    /// Where the hits go: .npz
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Say only whether each ray meets anything
+    #[arg(long)]
+    any: bool,
+    #[command(flatten)]
+    accuracy: AccuracyOption,
+    /// Worker threads; 0 for all processors [default: the profile's]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Rays that are traced together: 1, 4, 8 or 16 [default: what is quickest with a sample of the rays]
+    #[arg(long, value_name = "N")]
+    packet: Option<usize>,
+    /// Settings for building: a name in profiles/ or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
+    profile: String,
+    #[command(flatten)]
+    json: Json,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    engine: Engine,
+    #[serde(flatten)]
+    scene: SceneReport<'a>,
+    profile: &'a str,
+    isa: &'static str,
+    accuracy: Accuracy,
+    packet: usize,
+    threads: usize,
+    /// Whether any hit was asked for instead of the closest.
+    any: bool,
+    /// Rays, seconds of tracing, rays per second.
+    #[serde(flatten)]
+    count: RayCount,
+    /// Rays that met something.
+    hits: u64,
+    /// Seconds of reading the rays.
+    rays_read_seconds: f64,
+    /// Seconds of writing the answers.
+    write_seconds: f64,
+    output: &'a Path,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<()> {
+    let isa = Isa::from_env()?;
+    let profile = Profile::find(&args.profile)?;
+    let accuracy = args.accuracy.mode()?;
+    let kernel = args.kernel()?;
+    let threads = args.threads(&profile)?;
+    args.check_output()?;
+    args.json.check()?;
+
+    // A fault of the rays is found before the model is read and built.
+    let start = Instant::now();
+    let rays = read_rays(&args.rays)?;
+    let rays_read_seconds = start.elapsed().as_secs_f64();
+    let mut scene = Model::read(&args.scene)?.build(&profile.build, isa)?;
+    scene.accel.set_accuracy(accuracy);
+
+    let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
+    let (traced, hits, write_seconds) = args.cast(&batch, &rays, &scene)?;
+    let report = Report {
+        engine: ENGINE,
+        scene: scene.report(),
+        profile: &args.profile,
+        isa: isa.name(),
+        accuracy,
+        packet: traced.kernel.width(),
+        threads: traced.threads,
+        any: args.any,
+        count: RayCount::of(rays.len() as u64, traced.seconds),
+        hits,
+        rays_read_seconds,
+        write_seconds,
+        output: &args.output,
+    };
+    args.json.give(&args.text(&scene, &report), &report)
+}
+
+impl Args {
+    fn kernel(&self) -> Result<Option<Kernel>> {
+        let of_width = |width| {
+            Kernel::of_width(width)
+                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16")))
+        };
+        self.packet.map(of_width).transpose()
+    }
+
+    fn threads(&self, profile: &Profile) -> Result<usize> {
+        let threads = self.threads.unwrap_or(profile.render.threads);
+        let tuning = Tuning { threads, ..Tuning::default() };
+        tuning.check().map_err(as_option)?;
+        Ok(tuning.worker_count())
+    }
+
+    /// Finds out before any work whether the output can be written, and is not one of the other files.
+    fn check_output(&self) -> Result<()> {
+        if self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("npz")) {
+            let expected = "hits go to a .npz file";
+            return Err(Error::UnknownFormat { path: self.output.clone(), expected });
+        }
+        let others = [Some(&*self.scene), Some(&*self.rays), self.json.file()];
+        if others.into_iter().flatten().any(|other| same_file(&self.output, other)) {
+            let message =
+                format!("{} is named twice; give each file a name of its own", self.output.display());
+            return Err(Error::option("--output", message));
+        }
+        check_writable(&self.output)
+    }
+
+    /// Traces the rays and writes the answers; how it was traced, how many rays met something, and the
+    /// seconds of writing.
+    fn cast(&self, batch: &Batch<'_>, rays: &[Ray], scene: &Scene) -> Result<(Traced, u64, f64)> {
+        let tracing = || batch.fraction();
+        if self.any {
+            let mut occluded = vec![false; rays.len()];
+            let traced = watch("tracing", tracing, || batch.occluded(&mut occluded));
+            let writing = Instant::now();
+            write_occluded(&self.output, &occluded)?;
+            let hits = occluded.iter().filter(|&&any| any).count() as u64;
+            Ok((traced, hits, writing.elapsed().as_secs_f64()))
+        } else {
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let traced = watch("tracing", tracing, || batch.intersect(&mut hits));
+            let writing = Instant::now();
+            write_hits(&self.output, &hits, &scene.model.mesh)?;
+            let count = hits.iter().filter(|hit| hit.is_hit()).count() as u64;
+            Ok((traced, count, writing.elapsed().as_secs_f64()))
+        }
+    }
+
+    fn text(&self, scene: &Scene, report: &Report<'_>) -> String {
+        let mut lines = Lines::default();
+        scene.describe(&mut lines);
+        let RayCount { rays, seconds, rays_per_s } = report.count;
+        let size = bytes(rays * size_of::<Ray>() as u64);
+        lines.add(
+            "rays",
+            format!("{}, {size}, read in {}", grouped(rays), duration(report.rays_read_seconds)),
+        );
+        let packets = match report.packet {
+            1 => "single rays".into(),
+            width => format!("packets of {width}"),
+        };
+        let chosen = if self.packet.is_none() { " (chosen)" } else { "" };
+        let Engine { version, build } = ENGINE;
+        lines.add(
+            "engine",
+            format!(
+                "raypack {version} ({build}), {}, {}, {packets}{chosen}, {}",
+                report.isa,
+                report.accuracy,
+                counted(report.threads as u64, "thread")
+            ),
+        );
+        if cfg!(debug_assertions) {
+            lines.add("warning", "a debug build traces slowly; use cargo run --release");
+        }
+        let query = if self.any { "any hit" } else { "closest hit" };
+        lines.add(
+            "cast",
+            format!("{} rays in {}: {:.2} M/s, {query}", grouped(rays), duration(seconds), rays_per_s * 1e-6),
+        );
+        lines.add("hits", grouped(report.hits));
+        lines.add("wrote", format!("{} in {}", self.output.display(), duration(report.write_seconds)));
+        lines.text().to_owned()
+    }
+}
