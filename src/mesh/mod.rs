@@ -12,7 +12,7 @@ mod read;
 
 pub use check::MAX_TRIANGLES;
 pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
-pub use read::{Loaded, ReadReport, read, read_with_progress};
+pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
 
 use crate::geometry::Aabb;
 use glam::Vec3;

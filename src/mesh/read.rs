@@ -116,21 +116,42 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded> {
 /// The same; `progress` is told now and then what part of the file (0 to 1) is behind.
 pub fn read_with_progress(path: impl AsRef<Path>, progress: &dyn Fn(f32)) -> Result<Loaded> {
     let path = path.as_ref();
-    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let parse = match ending.as_deref() {
-        Some("obj") => obj::parse,
-        Some("ply") => ply::parse,
-        _ => {
-            return Err(Error::UnknownFormat {
-                path: path.into(),
-                expected: "a model is a .obj or a .ply file",
-            });
-        }
-    };
+    let parser = parser(path)?;
     let bytes = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
+    parse_with(parser, &bytes, path, progress)
+}
+
+/// The same from a file's bytes. `path` says by its ending how they are to be read, is what errors name,
+/// and gives the folder in which an OBJ's MTL files are looked up; there need be no such file.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Loaded> {
+    let path = path.as_ref();
+    parse_with(parser(path)?, bytes, path, &|_| {})
+}
+
+/// What makes a mesh, not checked yet, of a file's bytes.
+type Parser = fn(&[u8], &Path, &mut ReadReport, &dyn Fn(f32)) -> Result<Mesh, String>;
+
+/// The parser that a path's ending asks for.
+fn parser(path: &Path) -> Result<Parser> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match ending.as_deref() {
+        Some("obj") => Ok(obj::parse),
+        Some("ply") => Ok(ply::parse),
+        _ => {
+            let expected = "a model is a .obj or a .ply file";
+            Err(Error::UnknownFormat { path: path.into(), expected })
+        }
+    }
+}
+
+fn parse_with(parser: Parser, bytes: &[u8], path: &Path, progress: &dyn Fn(f32)) -> Result<Loaded> {
     let malformed = |message: String| Error::malformed(path, message);
     let mut report = ReadReport::default();
-    let raw = parse(&bytes, path, &mut report, progress).map_err(malformed)?;
+    let raw = parser(bytes, path, &mut report, progress).map_err(malformed)?;
     let (vertices, faces) = (raw.positions.len(), raw.triangles.len());
     let mesh = check::check(raw, &mut report).map_err(|unusable| {
         malformed(match unusable {

@@ -111,6 +111,13 @@ fn missing_and_broken_materials_are_said_and_not_fatal() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_material_file_without_an_end_is_missing() {
+    let loaded = read("a.obj", format!("mtllib /dev/zero\n{SQUARE}f 1 2 3\n"));
+    assert_eq!(loaded.report.missing_material_files, ["/dev/zero"]);
+}
+
+#[test]
 fn foreign_letters_do_no_harm() {
     let file = b"# M\xfcller\no Geh\xe4use\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     assert_eq!(read("a.obj", file).report.triangles, 1);

@@ -53,8 +53,8 @@ impl<'a> Library<'a> {
 
     fn open(&self, name: &str) -> std::io::Result<Vec<u8>> {
         let name = name.trim_matches('"');
-        std::fs::read(self.folder.join(name))
-            .or_else(|_| std::fs::read(self.folder.join(name.replace('\\', "/"))))
+        read_regular(&self.folder.join(name))
+            .or_else(|_| read_regular(&self.folder.join(name.replace('\\', "/"))))
     }
 
     /// Keeps names and diffuse colours, in forms on which tobj cannot stumble.
@@ -76,6 +76,14 @@ impl<'a> Library<'a> {
             }
         }
     }
+}
+
+/// A file's bytes. What is no regular file may have no end: a device, a pipe that nobody writes to.
+fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("not a regular file"));
+    }
+    std::fs::read(path)
 }
 
 /// `Kd r g b`, or `Kd r` for a grey. Spectral curves and CIE XYZ are not understood.
