@@ -15,9 +15,11 @@ use glam::Vec3;
 struct Vertex {
     at: [f64; 3],
     error: [f64; 3],
+    /// Whether the true polygon has this vertex, and not just a number near it.
+    certain: bool,
 }
 
-const NOWHERE: Vertex = Vertex { at: [0.0; 3], error: [0.0; 3] };
+const NOWHERE: Vertex = Vertex { at: [0.0; 3], error: [0.0; 3], certain: true };
 
 /// A triangle has three corners, and each of six planes adds at most one; rounding can make a
 /// sliver of a polygon not quite convex, so there is room for a few more.
@@ -62,9 +64,10 @@ impl Polygon {
     }
 
     /// Least and greatest coordinate along an axis, narrowed by the error bounds: what the true
-    /// polygon reaches for certain.
+    /// polygon reaches for certain. An empty range if nothing is.
     pub fn certain_range(&self, axis: usize) -> (f64, f64) {
-        self.vertices[..self.count].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), vertex| {
+        let certain = self.vertices[..self.count].iter().filter(|vertex| vertex.certain);
+        certain.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), vertex| {
             (low.min(vertex.at[axis] + vertex.error[axis]), high.max(vertex.at[axis] - vertex.error[axis]))
         })
     }
@@ -93,7 +96,8 @@ impl Polygon {
             let to = &old[(i + 1) % old.len()];
             let (df, dt) = (distance(from), distance(to));
             if df >= -from.error[axis] {
-                keep(*from);
+                let certain = from.certain && df >= from.error[axis];
+                keep(Vertex { certain, ..*from });
             }
             if (df > 0.0 && dt < 0.0) || (df < 0.0 && dt > 0.0) {
                 keep(self.crossing(from, to, [df, dt], axis, position));
@@ -108,7 +112,8 @@ impl Polygon {
         let s = df / (df - dt);
         // An edge nearly parallel to the plane crosses it wherever its ends' errors let it.
         let slack = (from.error[axis].max(to.error[axis]) / (df - dt).abs()).min(1.0);
-        let mut point = NOWHERE;
+        let crosses = df.abs() >= from.error[axis] && dt.abs() >= to.error[axis];
+        let mut point = Vertex { certain: from.certain && to.certain && crosses, ..NOWHERE };
         for i in 0..3 {
             let (a, b) = (from.at[i], to.at[i]);
             point.error[i] = from.error[i].max(to.error[i]);
