@@ -53,7 +53,7 @@ fn loose_slivers_are_hit_alike_by_all() {
         let slivers: Vec<[Vec3; 3]> = (0..150)
             .map(|_| {
                 let (a, b) = (numbers.vector(), numbers.vector());
-                let width = numbers.pick(&[1e-3, 1e-5, 1e-6]);
+                let width = numbers.pick(&[1e-3, 1e-5, 1e-6, 1e-7]);
                 let c = a + (b - a) * numbers.unit() + numbers.vector() * width;
                 [a, b, c]
             })
