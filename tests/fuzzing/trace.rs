@@ -29,7 +29,7 @@ pub fn build_and_trace(bytes: &[u8]) {
 
     let params = BuildParams {
         min_leaf: 1,
-        exact_below: if mesh.triangles.len() % 2 == 0 { 1 } else { 1024 },
+        exact_below: if mesh.triangles.len().is_multiple_of(2) { 1 } else { 1024 },
         ..Default::default()
     };
     let Ok(accel) = Accel::build(&mesh, &params) else { return };
