@@ -73,8 +73,8 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
     active: u32,
 ) -> HitPacket<W> {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
-    let rays = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let closest = walk::<W, L, T, M, false>(tree, records, rays, active);
+    let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
+    let closest = walk::<W, L, T, M, false>(tree, records, traced, active);
 
     // Fill in what belongs to the triangle.
     let primitive = L::ids_store(closest.primitive);
@@ -95,7 +95,7 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
         }
     }
     if let Some(adapted) = adapted {
-        adapted.undo(&mut hits, tree);
+        adapted.undo(rays, &mut hits, tree);
     }
     hits
 }

@@ -61,7 +61,9 @@ pub fn adapt<const W: usize>(rays: &RayPacket<W>, scale: Scale) -> Adapted<W> {
         new.tnear[lane] = (f64::from(rays.tnear[lane]) * factor) as f32;
         // What is beyond the floats' range in the ray's own unit is out of reach.
         new.tfar[lane] = (f64::from(rays.tfar[lane]).min(f64::from(f32::MAX)) * factor) as f32;
-        if rays.tfar[lane].is_nan() {
+        // An interval stays empty when its ends are rounded to the same.
+        let holds_something = rays.tnear[lane] <= rays.tfar[lane];
+        if !holds_something {
             new.tfar[lane] = f32::NAN;
         }
         adapted.t_factor[lane] = 1.0 / factor;
@@ -70,12 +72,14 @@ pub fn adapt<const W: usize>(rays: &RayPacket<W>, scale: Scale) -> Adapted<W> {
 }
 
 impl<const W: usize> Adapted<W> {
-    /// Turns hits back to what they are in the ray's unit and for the mesh's own corners.
+    /// Turns hits of `rays` back to what they are in their own unit and for the mesh's own corners.
     #[cold]
     #[inline(never)]
-    pub fn undo<T: Tree>(&self, hits: &mut HitPacket<W>, tree: &T) {
+    pub fn undo<T: Tree>(&self, rays: &RayPacket<W>, hits: &mut HitPacket<W>, tree: &T) {
         for lane in (0..W).filter(|&lane| hits.primitive[lane] != NO_PRIMITIVE) {
-            hits.t[lane] = (f64::from(hits.t[lane]) * self.t_factor[lane]) as f32;
+            // What underflowed on the way is brought back into the interval.
+            let t = (f64::from(hits.t[lane]) * self.t_factor[lane]) as f32;
+            hits.t[lane] = t.max(rays.tnear[lane]).min(rays.tfar[lane]) + 0.0;
             let normal = triangle::normal(&tree.scale().undo(tree.corners(hits.primitive[lane])));
             for axis in 0..3 {
                 hits.normal[axis][lane] = normal[axis];
