@@ -5,6 +5,7 @@
 
 mod build;
 mod node;
+mod pages;
 mod params;
 mod sah;
 mod scale;
@@ -37,6 +38,13 @@ pub trait Tree {
     fn children(&self, inner: Node) -> [Node; 2];
     /// The primitive ids of a leaf's triangles, in no order that means anything.
     fn primitives(&self, leaf: Node) -> &[u32];
+    /// The node at a place of the upper tree, whose root is at 0: an inner node, whose children's places
+    /// are `below()` and the next, or a leaf, which is a page.
+    fn upper(&self, place: usize) -> Node;
+    /// The node of the full tree at a place of the upper tree.
+    fn beneath(&self, place: usize) -> Node;
+    /// The primitives that a page of the upper tree holds, each once.
+    fn page(&self, leaf: Node) -> &[u32];
     /// A triangle's corners.
     fn corners(&self, primitive: u32) -> &Corners;
 }
@@ -48,6 +56,8 @@ pub struct KdTree {
     nodes: Vec<Node>,
     /// Primitive ids, leaf after leaf.
     references: Vec<u32>,
+    /// The same tree for kernels that look at many triangles at once.
+    pages: pages::Pages,
     /// Corners by primitive id.
     triangles: Vec<Corners>,
     bounds: Aabb,
@@ -74,7 +84,8 @@ impl KdTree {
         }
         let bounds = bounds(&triangles);
         let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
-        Ok(Self { nodes, references, triangles, bounds, scale, params: params.clone() })
+        let pages = pages::Pages::cut(&nodes, &references, params.page);
+        Ok(Self { nodes, references, pages, triangles, bounds, scale, params: params.clone() })
     }
 
     /// The box around all triangles, in the mesh's coordinates.
@@ -152,6 +163,21 @@ impl Tree for KdTree {
     #[inline(always)]
     fn primitives(&self, leaf: Node) -> &[u32] {
         &self.references[leaf.references()]
+    }
+
+    #[inline(always)]
+    fn upper(&self, place: usize) -> Node {
+        self.pages.upper[place]
+    }
+
+    #[inline(always)]
+    fn beneath(&self, place: usize) -> Node {
+        self.pages.beneath[place]
+    }
+
+    #[inline(always)]
+    fn page(&self, leaf: Node) -> &[u32] {
+        &self.pages.primitives[leaf.references()]
     }
 
     #[inline(always)]

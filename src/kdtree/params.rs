@@ -32,6 +32,9 @@ pub struct BuildParams {
     /// Greatest number of references per triangle, on average: it bounds the tree's size on
     /// meshes that the SAH would duplicate without end (long slivers in a bundle).
     pub max_duplication: f32,
+    /// A subtree of at most this many triangles is a page, in which a tile of rays looks at all
+    /// triangles at once. Raising it saves tiles steps and costs them tests; 64 is a good start.
+    pub page: usize,
 }
 
 impl Default for BuildParams {
@@ -46,6 +49,7 @@ impl Default for BuildParams {
             bins: 64,
             exact_below: 1024,
             max_duplication: 12.0,
+            page: 64,
         }
     }
 }
@@ -72,6 +76,8 @@ impl BuildParams {
             fail("bins", "must be between 8 and 1024")
         } else if !(1.0..=1000.0).contains(&self.max_duplication) {
             fail("max_duplication", "must be between 1 and 1000")
+        } else if !(1..=1 << 20).contains(&self.page) {
+            fail("page", "must be between 1 and 1048576")
         } else {
             Ok(())
         }

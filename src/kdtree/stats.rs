@@ -42,6 +42,12 @@ pub struct TreeStats {
     pub reference_bytes: usize,
     /// Memory of the triangles' corners.
     pub triangle_bytes: usize,
+    /// Memory of the pages.
+    pub page_bytes: usize,
+    /// Pages that are not empty.
+    pub pages: usize,
+    /// Triangles in a page, empty ones not counted.
+    pub triangles_per_page: f64,
     /// All memory divided by the number of triangles.
     pub bytes_per_triangle: f64,
 }
@@ -49,7 +55,7 @@ pub struct TreeStats {
 impl TreeStats {
     /// All memory of the tree.
     pub fn bytes(&self) -> usize {
-        self.node_bytes + self.reference_bytes + self.triangle_bytes
+        self.node_bytes + self.reference_bytes + self.page_bytes + self.triangle_bytes
     }
 }
 
@@ -65,6 +71,8 @@ impl KdTree {
             node_bytes: self.nodes.len() * size_of::<Node>(),
             reference_bytes: self.references.len() * size_of::<u32>(),
             triangle_bytes: self.triangles.len() * size_of::<Corners>(),
+            page_bytes: self.pages.bytes(),
+            pages: self.pages.upper.iter().filter(|n| n.is_leaf() && !n.references().is_empty()).count(),
             ..TreeStats::default()
         };
         let root_area = self.bounds.area();
@@ -96,6 +104,7 @@ impl KdTree {
         stats.references_per_triangle = stats.references as f64 / triangles;
         stats.triangles_per_leaf =
             stats.references as f64 / (stats.leaves - stats.empty_leaves).max(1) as f64;
+        stats.triangles_per_page = self.pages.primitives.len() as f64 / stats.pages.max(1) as f64;
         stats.sah_cost = f64::from(self.params.traversal_cost) * stats.expected_steps
             + f64::from(self.params.intersection_cost) * stats.expected_tests;
         stats.bytes_per_triangle = stats.bytes() as f64 / triangles;

@@ -60,7 +60,7 @@ impl<'a> Renderer<'a> {
             Kernel::Single => self.frame_of::<1>(camera, lighting, tiles_done),
             Kernel::Packet4 => self.frame_of::<4>(camera, lighting, tiles_done),
             Kernel::Packet8 => self.frame_of::<8>(camera, lighting, tiles_done),
-            Kernel::Packet16 => self.frame_of::<16>(camera, lighting, tiles_done),
+            Kernel::Packet16 | Kernel::Tile => self.frame_of::<16>(camera, lighting, tiles_done),
         }
     }
 

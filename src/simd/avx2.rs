@@ -34,7 +34,7 @@ macro_rules! avx {
 /// macro could build.
 macro_rules! avx2_lanes {
     ($width:literal, $lanes:ident, $mask:ident, $float:ty, $int:ty,
-     $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident $and:ident $andnot:ident $or:ident $xor:ident
+     $add:ident $sub:ident $mul:ident $fmadd:ident $div:ident $min:ident $max:ident $and:ident $andnot:ident $or:ident $xor:ident
      $cmp:ident $blend:ident $movemask:ident $splat:ident $load:ident $store:ident
      $iset:ident $igt:ident $isetr:ident $iand:ident $ieq:ident $istore:ident
      $to_float:ident $to_int:ident) => {
@@ -93,6 +93,10 @@ macro_rules! avx2_lanes {
             #[inline(always)]
             fn max(self, other: Self) -> Self {
                 Self(avx!($max(self.0, other.0)))
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, addend: Self) -> Self {
+                Self(avx!($fmadd(self.0, factor.0, addend.0)))
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -171,13 +175,13 @@ unsafe fn weights8() -> __m256i {
 }
 
 avx2_lanes!(4, F32x4, Mask4, __m128, __m128i,
-    _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_min_ps _mm_max_ps _mm_and_ps _mm_andnot_ps _mm_or_ps _mm_xor_ps
+    _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_fmadd_ps _mm_div_ps _mm_min_ps _mm_max_ps _mm_and_ps _mm_andnot_ps _mm_or_ps _mm_xor_ps
     _mm_cmp_ps _mm_blendv_ps _mm_movemask_ps _mm_set1_ps _mm_loadu_ps _mm_storeu_ps
     _mm_set1_epi32 _mm_cmpgt_epi32 weights4 _mm_and_si128 _mm_cmpeq_epi32 _mm_storeu_si128
     _mm_castsi128_ps _mm_castps_si128);
 
 avx2_lanes!(8, F32x8, Mask8, __m256, __m256i,
-    _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_min_ps _mm256_max_ps _mm256_and_ps _mm256_andnot_ps _mm256_or_ps _mm256_xor_ps
+    _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_fmadd_ps _mm256_div_ps _mm256_min_ps _mm256_max_ps _mm256_and_ps _mm256_andnot_ps _mm256_or_ps _mm256_xor_ps
     _mm256_cmp_ps _mm256_blendv_ps _mm256_movemask_ps _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps
     _mm256_set1_epi32 _mm256_cmpgt_epi32 weights8 _mm256_and_si256 _mm256_cmpeq_epi32 _mm256_storeu_si256
     _mm256_castsi256_ps _mm256_castps_si256);

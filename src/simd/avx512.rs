@@ -111,6 +111,18 @@ impl Lanes<16> for F32x16 {
         Self(avx512!(_mm512_max_ps(self.0, other.0)))
     }
     #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Self(avx512!(_mm512_fmadd_ps(self.0, factor.0, addend.0)))
+    }
+    #[inline(always)]
+    fn least(self) -> f32 {
+        avx512!(_mm512_reduce_min_ps(self.0))
+    }
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        avx512!(_mm512_reduce_max_ps(self.0))
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         Self(avx512!(_mm512_andnot_ps(_mm512_set1_ps(-0.0), self.0)))
     }

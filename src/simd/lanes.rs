@@ -37,6 +37,45 @@ pub trait Lanes<const W: usize>:
     fn min(self, other: Self) -> Self;
     /// `self > other ? self : other`, lane by lane: **`other` where either is NaN**.
     fn max(self, other: Self) -> Self;
+    /// `self * factor + addend`, with one rounding or with two: **implementations differ**, so that this
+    /// is for bounds, not for anything that a hit depends on.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
+    /// The least lane. No lane may be NaN.
+    #[inline(always)]
+    fn least(self) -> f32 {
+        let mut values = self.store();
+        let mut width = W;
+        while width > 1 {
+            width /= 2;
+            for lane in 0..width {
+                let other = values[lane + width];
+                values[lane] = if other < values[lane] { other } else { values[lane] };
+            }
+        }
+        values[0]
+    }
+    /// The greatest lane. No lane may be NaN.
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        let mut values = self.store();
+        let mut width = W;
+        while width > 1 {
+            width /= 2;
+            for lane in 0..width {
+                let other = values[lane + width];
+                values[lane] = if other > values[lane] { other } else { values[lane] };
+            }
+        }
+        values[0]
+    }
+    /// One lane's value in every lane. Panics if there is no such lane.
+    #[inline(always)]
+    fn lane(self, lane: usize) -> Self {
+        Self::splat(self.store()[lane])
+    }
     /// The magnitude: the sign bit cleared, NaN included.
     fn abs(self) -> Self;
     /// The magnitude of `self` with the sign bit of `sign`.

@@ -88,6 +88,18 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
         Self(self.0.max(other.0), self.1.max(other.1))
     }
     #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Self(self.0.mul_add(factor.0, addend.0), self.1.mul_add(factor.1, addend.1))
+    }
+    #[inline(always)]
+    fn least(self) -> f32 {
+        self.0.min(self.1).least()
+    }
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        self.0.max(self.1).greatest()
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.abs(), self.1.abs())
     }

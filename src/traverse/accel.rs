@@ -3,6 +3,7 @@
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::packet;
+use super::tile::{self, PACKETS};
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
 use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
@@ -161,6 +162,80 @@ impl Accel {
         }
     }
 
+    /// The closest hits of up to sixteen packets that share their origin, as squares of a picture do; the
+    /// lanes whose bit is not set in `active` come out as misses. What is too unlike to go together is
+    /// traced packet by packet. Panics if there are more than sixteen packets, or not as many `active`
+    /// and `hits`.
+    pub fn intersect_tile(&self, rays: &[RayPacket<16>], active: &[u32], hits: &mut [HitPacket<16>]) {
+        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
+        let lanes = tile_lanes(rays, active);
+        let (tree, active) = (&*self.tree, &lanes);
+        let done = match self.accuracy {
+            Accuracy::Fast => self.chosen.run(IntersectTile::<Fast> {
+                tree,
+                records: &self.projected,
+                rays,
+                active,
+                hits: &mut *hits,
+            }),
+            Accuracy::Watertight => self.chosen.run(IntersectTile::<Watertight> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+                hits: &mut *hits,
+            }),
+            Accuracy::Exact => self.chosen.run(IntersectTile::<Exact> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+                hits: &mut *hits,
+            }),
+        };
+        if !done {
+            for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
+                *hits = self.intersect_packet(rays, active);
+            }
+        }
+    }
+
+    /// A bit for each lane set in `active` in whose interval anything lies, packet by packet; otherwise as
+    /// [`intersect_tile`](Self::intersect_tile).
+    pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
+        assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
+        let lanes = tile_lanes(rays, active);
+        let (tree, active) = (&*self.tree, &lanes);
+        let done = match self.accuracy {
+            Accuracy::Fast => self.chosen.run(OccludedTile::<Fast> {
+                tree,
+                records: &self.projected,
+                rays,
+                active,
+                found: &mut *occluded,
+            }),
+            Accuracy::Watertight => self.chosen.run(OccludedTile::<Watertight> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+                found: &mut *occluded,
+            }),
+            Accuracy::Exact => self.chosen.run(OccludedTile::<Exact> {
+                tree,
+                records: tree.triangles(),
+                rays,
+                active,
+                found: &mut *occluded,
+            }),
+        };
+        if !done {
+            for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
+                *occluded = self.occluded_packet(rays, active);
+            }
+        }
+    }
+
     /// The closest hit of each ray, by the kernel named: for packets, rays that follow one
     /// another go together. Panics if the slices' lengths differ.
     pub fn intersect_many(&self, kernel: Kernel, rays: &[Ray], hits: &mut [Hit]) {
@@ -170,6 +245,7 @@ impl Accel {
             Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
             Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
+            Kernel::Tile => self.intersect_tiles(rays, hits),
         }
     }
 
@@ -182,6 +258,7 @@ impl Accel {
             Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
             Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
+            Kernel::Tile => self.occluded_tiles(rays, occluded),
         }
     }
 
@@ -208,6 +285,53 @@ impl Accel {
             }
         }
     }
+
+    fn intersect_tiles(&self, rays: &[Ray], hits: &mut [Hit]) {
+        for (rays, hits) in rays.chunks(PACKETS * 16).zip(hits.chunks_mut(PACKETS * 16)) {
+            let (packets, active) = packets_of(rays);
+            let mut found = [const { HitPacket::miss() }; PACKETS];
+            let count = rays.len().div_ceil(16);
+            self.intersect_tile(&packets[..count], &active[..count], &mut found[..count]);
+            for (i, hit) in hits.iter_mut().enumerate() {
+                *hit = found[i / 16].get(i % 16);
+            }
+        }
+    }
+
+    fn occluded_tiles(&self, rays: &[Ray], occluded: &mut [bool]) {
+        for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
+            let (packets, active) = packets_of(rays);
+            let mut found = [0; PACKETS];
+            let count = rays.len().div_ceil(16);
+            self.occluded_tile(&packets[..count], &active[..count], &mut found[..count]);
+            for (i, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = found[i / 16] >> (i % 16) & 1 == 1;
+            }
+        }
+    }
+}
+
+/// Up to a tile's rays as packets, and the lanes that hold one.
+fn packets_of(rays: &[Ray]) -> ([RayPacket<16>; PACKETS], [u32; PACKETS]) {
+    let mut packets = [const { RayPacket::empty() }; PACKETS];
+    let mut active = [0; PACKETS];
+    for ((rays, packet), active) in rays.chunks(16).zip(&mut packets).zip(&mut active) {
+        *packet = RayPacket::of_slice(rays);
+        *active = lanes_of(rays.len());
+    }
+    (packets, active)
+}
+
+/// The lanes of a tile's packets that count: none in packets that are not there. Panics if there are too
+/// many packets, or not as many of both.
+fn tile_lanes(rays: &[RayPacket<16>], active: &[u32]) -> [u32; PACKETS] {
+    assert!(rays.len() <= PACKETS, "at most sixteen packets");
+    assert_eq!(rays.len(), active.len(), "as many lanes as packets");
+    let mut lanes = [0; PACKETS];
+    for (lanes, active) in lanes.iter_mut().zip(active) {
+        *lanes = active & lanes_of(16);
+    }
+    lanes
 }
 
 /// The first `count` lanes, at most 16.
@@ -260,5 +384,39 @@ where
             self.rays,
             self.active,
         )
+    }
+}
+
+struct IntersectTile<'a, M: Mode> {
+    tree: &'a KdTree,
+    records: &'a [M::Record],
+    rays: &'a [RayPacket<16>],
+    active: &'a [u32; PACKETS],
+    hits: &'a mut [HitPacket<16>],
+}
+
+impl<M: Mode> Task for IntersectTile<'_, M> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        tile::intersect::<S::F16, _, M>(self.tree, self.records, self.rays, self.active, self.hits)
+    }
+}
+
+struct OccludedTile<'a, M: Mode> {
+    tree: &'a KdTree,
+    records: &'a [M::Record],
+    rays: &'a [RayPacket<16>],
+    active: &'a [u32; PACKETS],
+    found: &'a mut [u32],
+}
+
+impl<M: Mode> Task for OccludedTile<'_, M> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        tile::occluded::<S::F16, _, M>(self.tree, self.records, self.rays, self.active, self.found)
     }
 }

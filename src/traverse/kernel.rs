@@ -13,19 +13,22 @@ pub enum Kernel {
     Packet8,
     /// Sixteen.
     Packet16,
+    /// Up to 256 rays from one point as sixteen packets; rays that are too unlike go packet by packet.
+    Tile,
 }
 
 impl Kernel {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16];
+    pub const ALL: [Self; 5] = [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16, Self::Tile];
 
-    /// `single`, `packet4`, `packet8` or `packet16`.
+    /// `single`, `packet4`, `packet8`, `packet16` or `tile`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Single => "single",
             Self::Packet4 => "packet4",
             Self::Packet8 => "packet8",
             Self::Packet16 => "packet16",
+            Self::Tile => "tile",
         }
     }
 
@@ -36,6 +39,7 @@ impl Kernel {
             Self::Packet4 => 4,
             Self::Packet8 => 8,
             Self::Packet16 => 16,
+            Self::Tile => 256,
         }
     }
 

@@ -10,10 +10,13 @@
 //! nothing.
 
 mod accel;
+mod closest;
 mod kernel;
 mod lanes;
 mod packet;
 mod range;
+mod stack;
+mod tile;
 mod walk;
 
 pub use accel::Accel;

@@ -10,58 +10,20 @@
 //!
 //! With `W = 1` and plain floats this is the single-ray kernel.
 
+use super::closest::Closest;
 use super::lanes::{HitPacket, RayPacket};
 use super::range::{adapt, is_ordinary};
+use super::stack::Stack;
 use super::walk::{Heading, Interval, Walk, load3};
-use crate::geometry::NO_PRIMITIVE;
-use crate::geometry::triangle::{self, Mode, Test};
-use crate::kdtree::{MAX_DEPTH, Node, Tree};
+use crate::geometry::triangle::{Mode, Test};
+use crate::kdtree::{Node, Tree};
 use crate::simd::{Lanes, Mask};
-use std::mem::MaybeUninit;
-
-/// The id of no triangle yet: greater than any, so that equal `t` lets the first hit in.
-const NONE: i32 = i32::MAX;
-
-/// The closest hits so far.
-struct Closest<const W: usize, L: Lanes<W>> {
-    t: L,
-    u: L,
-    v: L,
-    primitive: L::Ids,
-}
 
 /// A subtree that waits for its turn, with the lanes' intervals in it.
 #[derive(Clone, Copy)]
 struct Waiting<L> {
     node: Node,
     interval: Interval<L>,
-}
-
-/// Subtrees that wait. Left uninitialised: clearing 8 KB would cost more than a short walk.
-struct Stack<L> {
-    entries: [MaybeUninit<Waiting<L>>; MAX_DEPTH],
-    len: usize,
-}
-
-impl<L: Copy> Stack<L> {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH], len: 0 }
-    }
-
-    /// Panics beyond `MAX_DEPTH` entries: a walk waits at most once a level.
-    #[inline(always)]
-    fn push(&mut self, waiting: Waiting<L>) {
-        self.entries[self.len].write(waiting);
-        self.len += 1;
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<Waiting<L>> {
-        self.len = self.len.checked_sub(1)?;
-        // SAFETY: `len` only grows in `push`, which has written every entry below it.
-        Some(unsafe { self.entries[self.len].assume_init() })
-    }
 }
 
 /// The closest hit of every lane in `active`. `records` holds what the mode keeps of each triangle.
@@ -74,26 +36,7 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
 ) -> HitPacket<W> {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let closest = walk::<W, L, T, M, false>(tree, records, traced, active);
-
-    // Fill in what belongs to the triangle.
-    let primitive = L::ids_store(closest.primitive);
-    let (t, u, v) = (closest.t.store(), closest.u.store(), closest.v.store());
-    let mut hits = HitPacket::miss();
-    for lane in 0..W {
-        if primitive[lane] != NONE {
-            let id = primitive[lane] as u32;
-            let record = &records[id as usize];
-            let normal = triangle::normal(tree.corners(id));
-            // A zero is given out without a sign.
-            let [u, v] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t[lane] + 0.0, u + 0.0, v + 0.0);
-            hits.primitive[lane] = id;
-            for axis in 0..3 {
-                hits.normal[axis][lane] = normal[axis];
-            }
-        }
-    }
+    let mut hits = walk::<W, L, T, M, false>(tree, records, traced, active).records::<T, M>(tree, records);
     if let Some(adapted) = adapted {
         adapted.undo(rays, &mut hits, tree);
     }
@@ -110,8 +53,7 @@ pub fn occluded<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
 ) -> u32 {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let rays = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let found = walk::<W, L, T, M, true>(tree, records, rays, active);
-    !L::ids_less(L::ids(NONE - 1), found.primitive).bits() & active
+    walk::<W, L, T, M, true>(tree, records, rays, active).found() & active
 }
 
 /// Walks the tree; with `ANY`, a lane is done at its first hit.
@@ -122,18 +64,30 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
     rays: &RayPacket<W>,
     active: u32,
 ) -> Closest<W, L> {
-    let (walk, mut interval) = Walk::<W, L>::new(rays, active, tree.bounds());
-    let zero = L::splat(0.0);
-    let mut closest =
-        Closest { t: L::splat(f32::MAX).min(L::load(&rays.tfar)), u: zero, v: zero, primitive: L::ids(NONE) };
+    let (walk, interval) = Walk::<W, L>::new(rays, active, tree.bounds());
+    let mut closest = Closest::new(L::load(&rays.tfar));
     let live = interval.live().bits();
-    if live == 0 {
-        return closest;
+    if live != 0 {
+        let test = M::Test::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
+        let tnear = L::load(&rays.tnear);
+        descend::<W, L, T, M, ANY>(tree, records, &walk, &test, tnear, tree.root(), interval, &mut closest);
     }
-    let test = M::Test::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
-    let tnear = L::load(&rays.tnear);
+    closest
+}
 
-    let mut node = tree.root();
+/// Walks the subtree under `node`, in which the lanes are in `interval`. Some lane must be live.
+#[expect(clippy::too_many_arguments, reason = "it is one half of a function in two kernels")]
+#[inline(always)]
+pub fn descend<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
+    tree: &T,
+    records: &[M::Record],
+    walk: &Walk<W, L>,
+    test: &M::Test<W, L>,
+    tnear: L,
+    mut node: Node,
+    mut interval: Interval<L>,
+    closest: &mut Closest<W, L>,
+) {
     let mut stack = Stack::new();
     loop {
         // Descend to a leaf, leaving farther children on the stack.
@@ -171,30 +125,14 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
             let live = interval.live();
             for &primitive in primitives {
                 let candidate = test.test(&records[primitive as usize], live);
-                let mut hit = candidate.inside & live;
-                if !hit.any() {
-                    continue;
-                }
-                let id = L::ids(primitive as i32);
-                let nearer = candidate.t.lt(closest.t)
-                    | (candidate.t.eq(closest.t) & L::ids_less(id, closest.primitive));
-                hit = hit & tnear.le(candidate.t) & nearer;
-                closest.primitive = L::ids_select(hit, id, closest.primitive);
-                if ANY {
-                    // A lane that is done has an interval that no later cell can reach.
-                    closest.t = L::select(hit, L::splat(f32::NEG_INFINITY), closest.t);
-                } else {
-                    closest.t = L::select(hit, candidate.t, closest.t);
-                    closest.u = L::select(hit, candidate.u, closest.u);
-                    closest.v = L::select(hit, candidate.v, closest.v);
-                }
+                closest.take::<ANY>(&candidate, primitive, tnear, live);
             }
         }
 
         // Take up the next subtree that some lane can still find something nearer in. Its
         // interval begins before its wall, so a hit in the wall does not hide the cell behind.
         loop {
-            let Some(next) = stack.pop() else { return closest };
+            let Some(next) = stack.pop() else { return };
             interval = Interval { tmin: next.interval.tmin, tmax: next.interval.tmax.min(closest.t) };
             if interval.live().any() {
                 node = next.node;
@@ -203,6 +141,3 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
         }
     }
 }
-
-/// A hit's id as the library gives it.
-const _: () = assert!(NO_PRIMITIVE > NONE as u32);

@@ -21,7 +21,7 @@ use crate::geometry::Aabb;
 use crate::simd::{Lanes, Mask};
 
 /// Half the thickness of a wall, relative to the reach.
-const MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub const MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// The least direction component, relative to the greatest.
 const FLATTEST: f32 = 1.0 / (1u64 << 40) as f32;

@@ -10,7 +10,7 @@ pub type Lanes3<L> = [L; 3];
 ///
 /// What a lane answers depends on that lane's ray and the triangle alone, not on the other lanes,
 /// the width or the instruction set: kernels that walk differently agree bit for bit.
-pub trait Test<const W: usize, L: Lanes<W>>: Sized {
+pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What is kept of each triangle for this test.
     type Record;
 

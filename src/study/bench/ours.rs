@@ -83,6 +83,10 @@ impl Engine for Ours {
             Kernel::Packet4 => self.packets::<4>(rays, any_hit),
             Kernel::Packet8 => self.packets::<8>(rays, any_hit),
             Kernel::Packet16 => self.packets::<16>(rays, any_hit),
+            Kernel::Tile => {
+                let lots = Lot::cut(rays, any_hit, HitPacket::miss(), |n| n.div_ceil(16), Packets::new);
+                Box::new(TileRun { engine: self, lots })
+            }
         };
         Kernel::ALL.map(contender).into()
     }
@@ -119,22 +123,80 @@ impl Contender for SingleRun<'_> {
     }
 }
 
+/// Packets in a tile.
+const TILE: usize = 16;
+
 /// Packets of `W`, all full but perhaps the last.
 struct Packets<const W: usize> {
     packets: Vec<RayPacket<W>>,
+    /// A bit for each ray of a packet.
+    lanes: Vec<u32>,
     rays: usize,
 }
 
 impl<const W: usize> Packets<W> {
     fn new(rays: &[Ray]) -> Self {
-        Self { packets: rays.chunks(W).map(RayPacket::of_slice).collect(), rays: rays.len() }
+        Self {
+            packets: rays.chunks(W).map(RayPacket::of_slice).collect(),
+            lanes: rays.chunks(W).map(|rays| (1 << rays.len()) - 1).collect(),
+            rays: rays.len(),
+        }
     }
 
     /// Each packet with a bit for each of its rays.
     #[inline(always)]
     fn with_lanes(&self) -> impl Iterator<Item = (&RayPacket<W>, u32)> {
-        let lanes = |i: usize| (1 << (self.rays - i * W).min(W)) - 1;
-        self.packets.iter().enumerate().map(move |(i, packet)| (packet, lanes(i)))
+        self.packets.iter().zip(self.lanes.iter().copied())
+    }
+
+    /// Packets a tile at a time, with a bit for each of their rays.
+    #[inline(always)]
+    fn tiles(&self) -> impl Iterator<Item = (&[RayPacket<W>], &[u32])> {
+        self.packets.chunks(TILE).zip(self.lanes.chunks(TILE))
+    }
+}
+
+/// Packets of 16 that are traced in tiles, as far as they are alike.
+struct TileRun<'a> {
+    engine: &'a Ours,
+    lots: Vec<Lot<Packets<16>, HitPacket<16>, u32>>,
+}
+
+impl Contender for TileRun<'_> {
+    fn mode(&self) -> String {
+        Kernel::Tile.name().into()
+    }
+
+    fn build_seconds(&self) -> f64 {
+        self.engine.build_seconds
+    }
+
+    fn bytes(&self) -> u64 {
+        self.engine.bytes
+    }
+
+    fn trace(&self, chunk: usize) {
+        let accel = &self.engine.accel;
+        self.lots[chunk].trace(
+            |rays, hits| {
+                for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
+                    accel.intersect_tile(packets, lanes, out);
+                }
+            },
+            |rays, flags| {
+                for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
+                    accel.occluded_tile(packets, lanes, out);
+                }
+            },
+        );
+    }
+
+    fn results(&self) -> Results {
+        collect(
+            &self.lots,
+            |packets, rays, all| all.extend((0..rays.rays).map(|i| packets[i / 16].get(i % 16))),
+            |packets, rays, all| all.extend((0..rays.rays).map(|i| packets[i / 16] >> (i % 16) & 1 == 1)),
+        )
     }
 }
 

@@ -1,0 +1,90 @@
+//! The closest hits so far, and how they become records.
+
+use super::lanes::HitPacket;
+use crate::geometry::NO_PRIMITIVE;
+use crate::geometry::triangle::{self, Candidate, Mode, Test};
+use crate::kdtree::Tree;
+use crate::simd::{Lanes, Mask};
+
+/// The id of no triangle yet: greater than any, so that equal `t` lets the first hit in.
+const NONE: i32 = i32::MAX;
+
+/// A hit's id as the library gives it.
+const _: () = assert!(NO_PRIMITIVE > NONE as u32);
+
+/// The closest hits of `W` rays so far; with any hit, which of them are done.
+#[derive(Clone, Copy)]
+pub struct Closest<const W: usize, L: Lanes<W>> {
+    /// What a hit must not lie beyond: the closest `t`, or `tfar`, which is infinite for nobody.
+    pub t: L,
+    u: L,
+    v: L,
+    primitive: L::Ids,
+}
+
+impl<const W: usize, L: Lanes<W>> Closest<W, L> {
+    /// Nothing found in the intervals that end at `tfar`.
+    #[inline(always)]
+    pub fn new(tfar: L) -> Self {
+        let zero = L::splat(0.0);
+        Self { t: L::splat(f32::MAX).min(tfar), u: zero, v: zero, primitive: L::ids(NONE) }
+    }
+
+    /// Takes up what a triangle's test found in the lanes `live`: the least `t`, then the lowest id.
+    /// With `ANY` a lane is done at its first hit. Says whether anything changed.
+    #[inline(always)]
+    pub fn take<const ANY: bool>(
+        &mut self,
+        candidate: &Candidate<W, L>,
+        primitive: u32,
+        tnear: L,
+        live: L::Mask,
+    ) -> bool {
+        let mut hit = candidate.inside & live;
+        if !hit.any() {
+            return false;
+        }
+        let id = L::ids(primitive as i32);
+        let nearer = candidate.t.lt(self.t) | (candidate.t.eq(self.t) & L::ids_less(id, self.primitive));
+        hit = hit & tnear.le(candidate.t) & nearer;
+        self.primitive = L::ids_select(hit, id, self.primitive);
+        if ANY {
+            // A lane that is done has an interval that no later cell can reach.
+            self.t = L::select(hit, L::splat(f32::NEG_INFINITY), self.t);
+        } else {
+            self.t = L::select(hit, candidate.t, self.t);
+            self.u = L::select(hit, candidate.u, self.u);
+            self.v = L::select(hit, candidate.v, self.v);
+        }
+        true
+    }
+
+    /// The lanes that found something.
+    #[inline(always)]
+    pub fn found(&self) -> u32 {
+        L::ids_less(self.primitive, L::ids(NONE)).bits()
+    }
+
+    /// Hit records, with what belongs to the triangles filled in.
+    #[inline(always)]
+    pub fn records<T: Tree, M: Mode>(&self, tree: &T, records: &[M::Record]) -> HitPacket<W> {
+        let primitive = L::ids_store(self.primitive);
+        let (t, u, v) = (self.t.store(), self.u.store(), self.v.store());
+        let mut hits = HitPacket::miss();
+        for lane in 0..W {
+            if primitive[lane] != NONE {
+                let id = primitive[lane] as u32;
+                let record = &records[id as usize];
+                let normal = triangle::normal(tree.corners(id));
+                // A zero is given out without a sign.
+                let [u, v] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
+                (hits.t[lane], hits.u[lane], hits.v[lane]) = (t[lane] + 0.0, u + 0.0, v + 0.0);
+                hits.primitive[lane] = id;
+                for axis in 0..3 {
+                    hits.normal[axis][lane] = normal[axis];
+                }
+            }
+        }
+        hits
+    }
+}

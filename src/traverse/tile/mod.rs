@@ -1,0 +1,188 @@
+//! The tile kernel: up to 256 rays from one point walk the tree together.
+//!
+//! Neighbouring rays of a picture visit the same nodes and miss the same triangles. So what a packet
+//! does for its rays, this kernel does for packets: each lane stands for one of sixteen packets, by
+//! *intervals* that hold what all of its rays do (multi-level ray tracing: Reshetov, Soupikov & Hurley
+//! 2005; interval traversal: Boulos, Wald & Benthin 2008). In order:
+//!
+//! 1. `beam`: the rays are made a beam; that decides whether they are alike enough at all.
+//! 2. `walk` (here): the beam descends the *upper tree*, whose leaves are pages of some fifty
+//!    triangles, near cells first.
+//! 3. `outline`: of a page's triangles, sixteen at a time, those that no ray can hit are culled: first
+//!    for the whole beam, then for single packets.
+//! 4. `leaf`: what is left is tested by the mode's own test, sixteen rays against one triangle, as the
+//!    packet kernel does, and so with the same answers to the bit.
+//! 5. Where no more than [`FEW`] packets of the beam are left at a node, each goes on alone as a
+//!    packet through the full tree below.
+
+mod beam;
+mod leaf;
+mod outline;
+
+pub use beam::PACKETS;
+
+use super::lanes::{HitPacket, RayPacket};
+use super::packet::descend;
+use super::range::is_ordinary;
+use super::stack::Stack;
+use super::walk::{Interval, Walk};
+use crate::geometry::triangle::Mode;
+use crate::kdtree::Tree;
+use crate::simd::{Lanes, Mask};
+use beam::Beam;
+use leaf::Tile;
+
+/// So many packets, or fewer, go on alone.
+const FEW: u32 = 2;
+
+/// A subtree that waits for its turn, with the packets' depths in it.
+#[derive(Clone, Copy)]
+struct Waiting<L> {
+    place: usize,
+    interval: Interval<L>,
+}
+
+/// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
+/// `false`, and nothing done, if the rays are no beam.
+#[inline(always)]
+pub fn intersect<L: Lanes<16>, T: Tree, M: Mode>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+    hits: &mut [HitPacket<16>],
+) -> bool {
+    let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
+    let mut tile = Tile::<L, T, M, false>::new(tree, records, rays, active, &beam);
+    walk(&mut tile, interval);
+    for (hits, closest) in hits.iter_mut().zip(&tile.closest) {
+        *hits = closest.records::<T, M>(tree, records);
+    }
+    true
+}
+
+/// The lanes in `active` that hit anything, packet by packet. `false`, and nothing done, if the rays
+/// are no beam.
+#[inline(always)]
+pub fn occluded<L: Lanes<16>, T: Tree, M: Mode>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+    found: &mut [u32],
+) -> bool {
+    let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
+    let mut tile = Tile::<L, T, M, true>::new(tree, records, rays, active, &beam);
+    walk(&mut tile, interval);
+    for (packet, found) in found.iter_mut().enumerate() {
+        *found = tile.closest[packet].found() & active[packet];
+    }
+    true
+}
+
+/// The beam of rays that are alike enough, and its depths inside of the tree's bounds.
+#[inline(always)]
+fn beam<L: Lanes<16>, T: Tree>(
+    tree: &T,
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+) -> Option<(Beam<L>, Interval<L>)> {
+    for (rays, &active) in rays.iter().zip(active) {
+        if !is_ordinary::<16, L>(rays, active, tree.scale()) {
+            return None;
+        }
+    }
+    Beam::new(rays, active, tree.bounds())
+}
+
+/// Walks the upper tree with all packets of a tile.
+#[inline(always)]
+fn walk<L: Lanes<16>, T: Tree, M: Mode, const ANY: bool>(
+    tile: &mut Tile<'_, L, T, M, ANY>,
+    mut interval: Interval<L>,
+) {
+    let (tree, beam) = (tile.tree, tile.beam);
+    let mut live = interval.live().bits();
+    if live == 0 {
+        return;
+    }
+    let mut place = 0;
+    let mut node = tree.upper(place);
+    let mut stack = Stack::new();
+    loop {
+        // Descend to a page, leaving far children on the stack.
+        loop {
+            if node.is_leaf() {
+                tile.visit(tree.page(node), &interval, live);
+                break;
+            }
+            if live.count_ones() <= FEW {
+                go_alone(tile, place, &interval, live);
+                break;
+            }
+            let crossing = beam.crossing(node.axis(), node.split());
+            let near = Interval { tmin: interval.tmin, tmax: crossing.leave.min(interval.tmax) };
+            let far = Interval { tmin: crossing.enter.max(interval.tmin), tmax: interval.tmax };
+            let (in_near, in_far) = (near.live().bits(), far.live().bits());
+            let below = node.below() as usize;
+            let (near_place, far_place) = (below + crossing.near, below + (1 - crossing.near));
+            if in_far == 0 {
+                // Whoever was live still is: the near cell holds all that is left.
+                place = near_place;
+            } else if in_near == 0 {
+                place = far_place;
+            } else {
+                stack.push(Waiting { place: far_place, interval: far });
+                (place, interval, live) = (near_place, near, in_near);
+            }
+            node = tree.upper(place);
+        }
+
+        // Take up the next subtree that some packet can still find something nearer in.
+        loop {
+            let Some(next) = stack.pop() else { return };
+            let tmax = L::load(&tile.reach).min(next.interval.tmax);
+            interval = Interval { tmin: next.interval.tmin, tmax };
+            live = interval.live().bits();
+            if live != 0 {
+                place = next.place;
+                break;
+            }
+        }
+        node = tree.upper(place);
+    }
+}
+
+/// The packets in `live` walk on by themselves, through the full tree.
+#[inline(always)]
+fn go_alone<L: Lanes<16>, T: Tree, M: Mode, const ANY: bool>(
+    tile: &mut Tile<'_, L, T, M, ANY>,
+    place: usize,
+    interval: &Interval<L>,
+    mut live: u32,
+) {
+    let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
+    while live != 0 {
+        let packet = live.trailing_zeros() as usize;
+        live &= live - 1;
+        let rays = &tile.rays[packet];
+        let (walk, inside) = Walk::<16, L>::new(rays, tile.active[packet], tile.tree.bounds());
+        let along = tile.beam.along(rays, tmin[packet], tmax[packet]);
+        let closest = &mut tile.closest[packet];
+        let interval =
+            Interval { tmin: along.tmin.max(inside.tmin), tmax: along.tmax.min(inside.tmax).min(closest.t) };
+        if interval.live().any() {
+            descend::<16, L, T, M, ANY>(
+                tile.tree,
+                tile.records,
+                &walk,
+                &tile.tests[packet],
+                L::load(&rays.tnear),
+                tile.tree.beneath(place),
+                interval,
+                closest,
+            );
+            tile.shorten(packet);
+        }
+    }
+}
