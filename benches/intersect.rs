@@ -6,7 +6,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use raypack::geometry::Ray;
 use raypack::geometry::triangle::fast::Projected;
-use raypack::geometry::triangle::{Corners, Exact, Fast, Mode, Test, Watertight};
+use raypack::geometry::triangle::{Corners, Exact, Fast, Mode, Test, Triangle, Watertight};
 use raypack::mesh::generate::shapes;
 use raypack::simd::{Chosen, Isa, Lanes, Mask, Simd, Task};
 use raypack::traverse::{PacketWidth, RayPacket};
@@ -58,8 +58,9 @@ where
 fn intersect(c: &mut Criterion) {
     let mesh = shapes::soup(4096, 1);
     let corners = |i| mesh.corners(i).map(|p| p.to_array());
-    let triangles: Vec<Corners> = (0..mesh.triangles.len() as u32).map(corners).collect();
-    let projected: Vec<Projected> = triangles.iter().map(Projected::new).collect();
+    let corners: Vec<Corners> = (0..mesh.triangles.len() as u32).map(corners).collect();
+    let projected: Vec<Projected> = corners.iter().map(Projected::new).collect();
+    let triangles: Vec<Triangle> = corners.into_iter().map(Triangle::new).collect();
     for isa in Isa::ALL.into_iter().filter_map(Chosen::new) {
         widths::<Fast>(c, isa, &projected);
         widths::<Watertight>(c, isa, &triangles);

@@ -20,9 +20,10 @@ pub use stats::TreeStats;
 
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
-use crate::geometry::triangle::Corners;
+use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// What a traversal kernel asks of a tree.
 ///
@@ -45,8 +46,13 @@ pub trait Tree {
     fn beneath(&self, place: usize) -> Node;
     /// The primitives that a page of the upper tree holds, each once.
     fn page(&self, leaf: Node) -> &[u32];
+    /// A triangle's record.
+    fn triangle(&self, primitive: u32) -> &Triangle;
     /// A triangle's corners.
-    fn corners(&self, primitive: u32) -> &Corners;
+    #[inline(always)]
+    fn corners(&self, primitive: u32) -> &Corners {
+        &self.triangle(primitive).corners
+    }
 }
 
 /// A kd-tree in memory: nodes, the leaves' references, and the triangles' corners.
@@ -58,8 +64,8 @@ pub struct KdTree {
     references: Vec<u32>,
     /// The same tree for kernels that look at many triangles at once.
     pages: pages::Pages,
-    /// Corners by primitive id.
-    triangles: Vec<Corners>,
+    /// Records by primitive id.
+    triangles: Vec<Triangle>,
     bounds: Aabb,
     scale: Scale,
     params: BuildParams,
@@ -84,6 +90,7 @@ impl KdTree {
         }
         let bounds = bounds(&triangles);
         let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        let triangles = triangles.into_par_iter().map(Triangle::new).collect();
         let pages = pages::Pages::cut(&nodes, &references, params.page);
         Ok(Self { nodes, references, pages, triangles, bounds, scale, params: params.clone() })
     }
@@ -94,9 +101,9 @@ impl KdTree {
         Aabb { min: min.into(), max: max.into() }
     }
 
-    /// The corners of all triangles, by primitive id, in the tree's coordinates.
+    /// All triangles, by primitive id, in the tree's coordinates.
     #[inline(always)]
-    pub fn triangles(&self) -> &[Corners] {
+    pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
     }
 
@@ -181,7 +188,7 @@ impl Tree for KdTree {
     }
 
     #[inline(always)]
-    fn corners(&self, primitive: u32) -> &Corners {
+    fn triangle(&self, primitive: u32) -> &Triangle {
         &self.triangles[primitive as usize]
     }
 }

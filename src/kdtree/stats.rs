@@ -2,7 +2,7 @@
 
 use super::{KdTree, Node, Tree};
 use crate::geometry::Aabb;
-use crate::geometry::triangle::Corners;
+use crate::geometry::triangle::Triangle;
 use serde::Serialize;
 
 /// What a tree looks like and what a ray is expected to pay in it.
@@ -40,7 +40,7 @@ pub struct TreeStats {
     pub node_bytes: usize,
     /// Memory of the leaves' references.
     pub reference_bytes: usize,
-    /// Memory of the triangles' corners.
+    /// Memory of the triangles' corners and planes.
     pub triangle_bytes: usize,
     /// Memory of the pages.
     pub page_bytes: usize,
@@ -70,7 +70,7 @@ impl KdTree {
             leaf_histogram: vec![0; HISTOGRAM + 1],
             node_bytes: self.nodes.len() * size_of::<Node>(),
             reference_bytes: self.references.len() * size_of::<u32>(),
-            triangle_bytes: self.triangles.len() * size_of::<Corners>(),
+            triangle_bytes: self.triangles.len() * size_of::<Triangle>(),
             page_bytes: self.pages.bytes(),
             pages: self.pages.upper.iter().filter(|n| n.is_leaf() && !n.references().is_empty()).count(),
             ..TreeStats::default()

@@ -3,7 +3,7 @@
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::packet;
-use super::tile::{self, PACKETS};
+use super::tile::{self, PACKETS, TileCounts};
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
 use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
@@ -76,7 +76,8 @@ impl Accel {
     /// bytes a triangle, which stay.
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
         if accuracy == Accuracy::Fast && self.projected.is_empty() {
-            self.projected = self.tree.triangles().par_iter().map(Projected::new).collect::<Vec<_>>().into();
+            let records = self.tree.triangles().par_iter().map(|triangle| Projected::new(&triangle.corners));
+            self.projected = records.collect::<Vec<_>>().into();
         }
         self.accuracy = accuracy;
     }
@@ -198,6 +199,15 @@ impl Accel {
                 *hits = self.intersect_packet(rays, active);
             }
         }
+    }
+
+    /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, in watertight mode.
+    pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], counts: &mut TileCounts) {
+        let mut hits = [const { HitPacket::miss() }; PACKETS];
+        let (tree, active) = (&*self.tree, &tile_lanes(rays, active));
+        let hits = &mut hits[..rays.len()];
+        let done = self.chosen.run(CountTile { tree, rays, active, hits, counts });
+        counts.beams += u64::from(done);
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet; otherwise as
@@ -400,7 +410,8 @@ impl<M: Mode> Task for IntersectTile<'_, M> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        tile::intersect::<S::F16, _, M>(self.tree, self.records, self.rays, self.active, self.hits)
+        let Self { tree, records, rays, active, hits } = self;
+        tile::intersect::<S::F16, _, M, _>(tree, records, rays, active, hits, &mut ())
     }
 }
 
@@ -418,5 +429,23 @@ impl<M: Mode> Task for OccludedTile<'_, M> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         tile::occluded::<S::F16, _, M>(self.tree, self.records, self.rays, self.active, self.found)
+    }
+}
+
+struct CountTile<'a> {
+    tree: &'a KdTree,
+    rays: &'a [RayPacket<16>],
+    active: &'a [u32; PACKETS],
+    hits: &'a mut [HitPacket<16>],
+    counts: &'a mut TileCounts,
+}
+
+impl Task for CountTile<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { tree, rays, active, hits, counts } = self;
+        tile::intersect::<S::F16, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
     }
 }

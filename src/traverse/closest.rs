@@ -68,23 +68,34 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     /// Hit records, with what belongs to the triangles filled in.
     #[inline(always)]
     pub fn records<T: Tree, M: Mode>(&self, tree: &T, records: &[M::Record]) -> HitPacket<W> {
-        let primitive = L::ids_store(self.primitive);
-        let (t, u, v) = (self.t.store(), self.u.store(), self.v.store());
-        let mut hits = HitPacket::miss();
-        for lane in 0..W {
-            if primitive[lane] != NONE {
-                let id = primitive[lane] as u32;
-                let record = &records[id as usize];
-                let normal = triangle::normal(tree.corners(id));
-                // A zero is given out without a sign.
-                let [u, v] = M::Test::<W, L>::weights(record, u[lane], v[lane]);
-                (hits.t[lane], hits.u[lane], hits.v[lane]) = (t[lane] + 0.0, u + 0.0, v + 0.0);
-                hits.primitive[lane] = id;
-                for axis in 0..3 {
-                    hits.normal[axis][lane] = normal[axis];
-                }
+        let found = L::ids_less(self.primitive, L::ids(NONE));
+        let ids = L::ids_store(L::ids_select(found, self.primitive, L::ids(NO_PRIMITIVE as i32)));
+        let zero = L::splat(0.0);
+        let (mut u, mut v) = (zero, zero);
+        let mut normal = [zero; 3];
+
+        // Triangle by triangle: neighbouring rays mostly hit the same.
+        let mut rest = found.bits();
+        while rest != 0 {
+            let id = ids[rest.trailing_zeros() as usize % W];
+            let lanes = !(L::ids_less(self.primitive, L::ids(id)) | L::ids_less(L::ids(id), self.primitive));
+            rest &= !lanes.bits();
+            let weights = M::Test::<W, L>::weights(&records[id as usize], self.u, self.v);
+            let along = triangle::normal(tree.corners(id as u32));
+            u = L::select(lanes, weights[0], u);
+            v = L::select(lanes, weights[1], v);
+            for axis in 0..3 {
+                normal[axis] = L::select(lanes, L::splat(along[axis]), normal[axis]);
             }
         }
-        hits
+
+        // A zero is given out without a sign.
+        HitPacket {
+            t: (L::select(found, self.t, L::splat(f32::INFINITY)) + zero).store(),
+            u: (u + zero).store(),
+            v: (v + zero).store(),
+            primitive: ids.map(|id| id as u32),
+            normal: [normal[0].store(), normal[1].store(), normal[2].store()],
+        }
     }
 }

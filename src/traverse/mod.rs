@@ -22,6 +22,7 @@ mod walk;
 pub use accel::Accel;
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, PacketWidth, RayPacket};
+pub use tile::TileCounts;
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use raypack::geometry::triangle::fast::Projected;
-use raypack::geometry::triangle::{Exact, Fast, Mode, Test, Watertight, normal};
+use raypack::geometry::triangle::{Exact, Fast, Mode, Test, Triangle, Watertight, normal};
 use raypack::geometry::{Aabb, Accuracy, Hit, NO_PRIMITIVE, Ray};
 use raypack::mesh::Mesh;
 
@@ -10,8 +10,8 @@ use raypack::mesh::Mesh;
 pub fn same_test(mesh: &Mesh, ray: &Ray, accuracy: Accuracy) -> Hit {
     match accuracy {
         Accuracy::Fast => by_test::<Fast>(mesh, ray, Projected::new),
-        Accuracy::Watertight => by_test::<Watertight>(mesh, ray, |&corners| corners),
-        Accuracy::Exact => by_test::<Exact>(mesh, ray, |&corners| corners),
+        Accuracy::Watertight => by_test::<Watertight>(mesh, ray, |&corners| Triangle::new(corners)),
+        Accuracy::Exact => by_test::<Exact>(mesh, ray, |&corners| Triangle::new(corners)),
     }
 }
 

@@ -84,6 +84,7 @@ pub struct Lines<const W: usize, L: Lanes<W>> {
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     type Record = Projected;
+    type Placed = ();
 
     #[inline(always)]
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, _active: u32) -> Self {
@@ -118,9 +119,9 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     }
 
     #[inline(always)]
-    fn weights(triangle: &Projected, u: f32, v: f32) -> [f32; 2] {
+    fn weights(triangle: &Projected, u: L, v: L) -> [L; 2] {
         // The record's corners are the triangle's from `first` on, in turn.
-        let rest = 1.0 - (u + v);
+        let rest = L::splat(1.0) - (u + v);
         match triangle.first {
             0 => [u, v],
             1 => [rest, u],

@@ -11,10 +11,12 @@
 mod accuracy;
 pub mod exact;
 pub mod fast;
+mod record;
 mod test;
 pub mod watertight;
 
 pub use accuracy::Accuracy;
+pub use record::Triangle;
 pub use test::{Candidate, Exact, Fast, Lanes3, Mode, Test, Watertight};
 
 use glam::{DVec3, Vec3};

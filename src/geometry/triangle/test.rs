@@ -1,6 +1,6 @@
 //! What every ray-triangle test is to a traversal kernel.
 
-use super::{Accuracy, Corners};
+use super::{Accuracy, Triangle};
 use crate::simd::Lanes;
 
 /// Three coordinates, `W` lanes each.
@@ -13,6 +13,8 @@ pub type Lanes3<L> = [L; 3];
 pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What is kept of each triangle for this test.
     type Record;
+    /// What rays that start at one point can share of a triangle.
+    type Placed: Copy + Default;
 
     /// Prepares `W` rays. `active` has a bit for each lane that matters.
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
@@ -25,10 +27,23 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// gap that so opens between its neighbours.
     fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
 
+    /// A triangle prepared for rays that all start at `apex`.
+    #[inline(always)]
+    fn place(_triangle: &Self::Record, _apex: &[f32; 3]) -> Self::Placed {
+        Self::Placed::default()
+    }
+
+    /// What [`test`](Self::test) answers, to the bit, if all lanes that matter start at the apex that
+    /// `placed` was prepared for. (Other lanes' answers mean nothing.)
+    #[inline(always)]
+    fn test_placed(&self, triangle: &Self::Record, _placed: &Self::Placed, lanes: L::Mask) -> Candidate<W, L> {
+        self.test(triangle, lanes)
+    }
+
     /// The barycentric weights `(u, v)` of the triangle's second and third corner, from those that
     /// `test` gave: a record may hold the corners in another order.
     #[inline(always)]
-    fn weights(_triangle: &Self::Record, u: f32, v: f32) -> [f32; 2] {
+    fn weights(_triangle: &Self::Record, u: L, v: L) -> [L; 2] {
         [u, v]
     }
 }
@@ -84,12 +99,12 @@ impl Mode for Fast {
 
 impl Mode for Watertight {
     const ACCURACY: Accuracy = Accuracy::Watertight;
-    type Record = Corners;
+    type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::watertight::Shear<W, L>;
 }
 
 impl Mode for Exact {
     const ACCURACY: Accuracy = Accuracy::Exact;
-    type Record = Corners;
+    type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
 }

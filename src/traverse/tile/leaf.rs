@@ -2,6 +2,7 @@
 
 use super::beam::{Beam, PACKETS};
 use super::outline::{Block, Window};
+use super::probe::Probe;
 use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask};
@@ -25,6 +26,8 @@ pub struct Tile<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> {
     /// What the packets see of the scene, depths apart.
     window: Window<L>,
     block: Block,
+    /// The block's triangles that are left, as their test sees them from the beam's apex.
+    placed: [<M::Test<16, L> as Test<16, L>>::Placed; 16],
 }
 
 impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY> {
@@ -59,28 +62,36 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
             reach: [f32::INFINITY; PACKETS],
             window: Window::new(beam.low, beam.high, never, ever),
             block: Block::new(),
+            placed: Default::default(),
         }
     }
 
     /// Looks for hits among a page's triangles, for the packets in `live` in their depths.
     #[inline(always)]
-    pub fn visit(&mut self, page: &[u32], interval: &Interval<L>, live: u32) {
+    pub fn visit<P: Probe>(&mut self, page: &[u32], interval: &Interval<L>, live: u32, probe: &mut P) {
         if page.is_empty() {
             return;
         }
+        probe.page(live.count_ones());
         let mut window = self.window;
         (window.nearest, window.farthest) = (interval.tmin, interval.tmax);
         let all = union(&window, L::mask_from_bits(live));
         for primitives in page.chunks(16) {
             // Cull for the beam.
             for (lane, &primitive) in primitives.iter().enumerate() {
-                self.block.set(lane, self.tree.corners(primitive), &self.beam.axes);
+                self.block.set(lane, self.tree.triangle(primitive), &self.beam.axes);
             }
             let outline = self.block.outline(self.beam);
             let present = (1 << primitives.len()) - 1;
             let left = outline.meets(&all).bits() & present;
+            probe.block(primitives.len(), left.count_ones());
             if left == 0 {
                 continue;
+            }
+
+            for triangle in bits(left) {
+                let record = &self.records[primitives[triangle] as usize];
+                self.placed[triangle] = M::Test::<16, L>::place(record, &self.beam.apex);
             }
 
             // Cull for packets, the rarer of packets and triangles one by one.
@@ -101,6 +112,7 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
             // Test what is left.
             for packet in bits(live) {
                 if chosen[packet & 15] != 0 {
+                    probe.tests(chosen[packet & 15].count_ones());
                     self.test(packet, primitives, chosen[packet & 15]);
                 }
             }
@@ -119,7 +131,7 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
         let mut changed = false;
         for triangle in bits(chosen) {
             let primitive = primitives[triangle];
-            let candidate = test.test(&self.records[primitive as usize], live);
+            let candidate = test.test_placed(&self.records[primitive as usize], &self.placed[triangle & 15], live);
             changed |= closest.take::<ANY>(&candidate, primitive, tnear, live);
         }
         if changed {

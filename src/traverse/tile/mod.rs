@@ -18,8 +18,10 @@
 mod beam;
 mod leaf;
 mod outline;
+mod probe;
 
 pub use beam::PACKETS;
+pub use probe::{Probe, TileCounts};
 
 use super::lanes::{HitPacket, RayPacket};
 use super::packet::descend;
@@ -45,16 +47,17 @@ struct Waiting<L> {
 /// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
 /// `false`, and nothing done, if the rays are no beam.
 #[inline(always)]
-pub fn intersect<L: Lanes<16>, T: Tree, M: Mode>(
+pub fn intersect<L: Lanes<16>, T: Tree, M: Mode, P: Probe>(
     tree: &T,
     records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
+    probe: &mut P,
 ) -> bool {
     let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
     let mut tile = Tile::<L, T, M, false>::new(tree, records, rays, active, &beam);
-    walk(&mut tile, interval);
+    walk(&mut tile, interval, probe);
     for (hits, closest) in hits.iter_mut().zip(&tile.closest) {
         *hits = closest.records::<T, M>(tree, records);
     }
@@ -73,7 +76,7 @@ pub fn occluded<L: Lanes<16>, T: Tree, M: Mode>(
 ) -> bool {
     let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
     let mut tile = Tile::<L, T, M, true>::new(tree, records, rays, active, &beam);
-    walk(&mut tile, interval);
+    walk(&mut tile, interval, &mut ());
     for (packet, found) in found.iter_mut().enumerate() {
         *found = tile.closest[packet].found() & active[packet];
     }
@@ -97,9 +100,10 @@ fn beam<L: Lanes<16>, T: Tree>(
 
 /// Walks the upper tree with all packets of a tile.
 #[inline(always)]
-fn walk<L: Lanes<16>, T: Tree, M: Mode, const ANY: bool>(
+fn walk<L: Lanes<16>, T: Tree, M: Mode, P: Probe, const ANY: bool>(
     tile: &mut Tile<'_, L, T, M, ANY>,
     mut interval: Interval<L>,
+    probe: &mut P,
 ) {
     let (tree, beam) = (tile.tree, tile.beam);
     let mut live = interval.live().bits();
@@ -112,11 +116,13 @@ fn walk<L: Lanes<16>, T: Tree, M: Mode, const ANY: bool>(
     loop {
         // Descend to a page, leaving far children on the stack.
         loop {
+            probe.node(live.count_ones());
             if node.is_leaf() {
-                tile.visit(tree.page(node), &interval, live);
+                tile.visit(tree.page(node), &interval, live, probe);
                 break;
             }
             if live.count_ones() <= FEW {
+                probe.alone(live.count_ones());
                 go_alone(tile, place, &interval, live);
                 break;
             }

@@ -12,6 +12,10 @@
 //!   edges.
 //! - **Box.** The corners' slopes `x / z` and `y / z`.
 //! - **Depth.** The corners' `z`.
+//! - **Plane.** A ray meets the plane `n . x = d` at the depth `d / (n . (a, b, 1))`, so that over a
+//!   rectangle of slopes the plane has a least and a greatest depth too. A wall that reaches from the
+//!   eye to the horizon is where it is, not where its corners are: it is tested in the cell in which it
+//!   is hit, and not at all behind what hides it.
 //!
 //! **Nothing is lost.** Every test of [`crate::geometry::triangle`] answers for corners moved by no
 //! more than some 16 roundings of `far`, the greatest coordinate of the triangle relative to the apex.
@@ -20,7 +24,7 @@
 //! about a hit.
 
 use super::beam::Beam;
-use crate::geometry::triangle::Corners;
+use crate::geometry::triangle::Triangle;
 use crate::simd::Lanes;
 
 /// By how much outlines are widened, relative to the farthest corner.
@@ -60,6 +64,8 @@ impl<L: Lanes<16>> Window<L> {
 pub struct Outline<L> {
     /// For each edge `p x q`, and its slack.
     edges: [[L; 4]; 3],
+    /// The plane's normal, its distance from the apex (not negative), and that one's slack.
+    plane: [L; 5],
     /// Slopes and depths, slack included.
     low: [L; 2],
     high: [L; 2],
@@ -83,7 +89,13 @@ impl<L: Lanes<16>> Outline<L> {
             least = least.min(center + width);
             greatest = greatest.max(center - width);
         }
+        // How fast rays come nearer to the plane.
+        let [x, y, z, distance, slack] = self.plane;
+        let center = x.mul_add(a, y.mul_add(b, z));
+        let width = x.abs().mul_add(half_a, y.abs() * half_b);
         (zero.le(least) | greatest.le(zero))
+            & (distance - slack).le(window.farthest * (center + width))
+            & (window.nearest * (center - width)).le(distance + slack)
             & self.near.le(window.farthest)
             & window.nearest.le(self.far)
             & self.low[0].le(window.high[0])
@@ -102,8 +114,11 @@ type Row = [f32; 16];
 pub struct Block {
     /// `corners[corner][axis]`, axes renamed as in the beam's frame.
     corners: [[Row; 3]; 3],
+    /// Their planes' normals, likewise.
+    normal: [Row; 3],
     /// The rows of their outlines.
     edges: [[Row; 4]; 3],
+    plane: [Row; 5],
     low: [Row; 2],
     high: [Row; 2],
     near: Row,
@@ -116,6 +131,8 @@ impl Block {
         const ROW: Row = [0.0; 16];
         Self {
             corners: [[ROW; 3]; 3],
+            normal: [ROW; 3],
+            plane: [ROW; 5],
             edges: [[ROW; 4]; 3],
             low: [ROW; 2],
             high: [ROW; 2],
@@ -126,12 +143,13 @@ impl Block {
 
     /// Puts a triangle into a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, corners: &Corners, axes: &[usize; 3]) {
+    pub fn set(&mut self, lane: usize, triangle: &Triangle, axes: &[usize; 3]) {
         let lane = lane & 15;
-        for (rows, corner) in self.corners.iter_mut().zip(corners) {
-            for (row, &axis) in rows.iter_mut().zip(axes) {
-                row[lane] = corner[axis];
+        for i in 0..3 {
+            for j in 0..3 {
+                self.corners[i][j][lane] = triangle.corners[i][axes[j]];
             }
+            self.normal[i][lane] = triangle.plane[axes[i]];
         }
     }
 
@@ -186,7 +204,20 @@ impl Block {
             high[side] = L::select(in_front, greatest, infinite);
         }
 
-        let outline = Outline { edges, low, high, near: near - slack, far: back + slack };
+        // The plane, turned so that the apex is behind it. Too near, it may be on either side; so it is
+        // for a triangle without area, whose normal is zero.
+        let n = [
+            L::load(&self.normal[0]),
+            L::load(&self.normal[1]),
+            L::load(&self.normal[2]) * L::splat(beam.sign),
+        ];
+        let distance = n[0] * points[0][0] + n[1] * points[0][1] + n[2] * points[0][2];
+        let sure = slack.lt(distance.abs());
+        let turned = L::splat(1.0).copysign(distance);
+        let turned = L::select(sure, turned, zero);
+        let plane = [n[0] * turned, n[1] * turned, n[2] * turned, distance * turned, slack];
+
+        let outline = Outline { edges, plane, low, high, near: near - slack, far: back + slack };
         self.keep(&outline);
         outline
     }
@@ -197,6 +228,9 @@ impl Block {
             for j in 0..4 {
                 self.edges[i][j] = outline.edges[i][j].store();
             }
+        }
+        for j in 0..5 {
+            self.plane[j] = outline.plane[j].store();
         }
         for side in 0..2 {
             self.low[side] = outline.low[side].store();
@@ -217,8 +251,13 @@ impl Block {
                 edges[i][j] = L::splat(self.edges[i][j][lane]);
             }
         }
+        let mut plane = [zero; 5];
+        for j in 0..5 {
+            plane[j] = L::splat(self.plane[j][lane]);
+        }
         Outline {
             edges,
+            plane,
             low: [L::splat(self.low[0][lane]), L::splat(self.low[1][lane])],
             high: [L::splat(self.high[0][lane]), L::splat(self.high[1][lane])],
             near: L::splat(self.near[lane]),

@@ -10,7 +10,7 @@
 mod determinant;
 
 use super::watertight::Shear;
-use super::{Candidate, Corners, Lanes3, Test};
+use super::{Candidate, Corners, Lanes3, Test, Triangle};
 use crate::simd::{Lanes, Mask};
 use determinant::{along_normal, volume};
 use glam::{DVec3, Vec3};
@@ -24,7 +24,8 @@ pub struct Filter<const W: usize, L: Lanes<W>> {
 }
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
-    type Record = Corners;
+    type Record = Triangle;
+    type Placed = ();
 
     #[inline(always)]
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {
@@ -36,7 +37,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     }
 
     #[inline(always)]
-    fn test(&self, corners: &Corners, lanes: L::Mask) -> Candidate<W, L> {
+    fn test(&self, triangle: &Triangle, lanes: L::Mask) -> Candidate<W, L> {
+        let corners = &triangle.corners;
         let likely = self.shear.likely(corners) & lanes;
         if !likely.any() {
             return Candidate::none(likely);
@@ -106,7 +108,7 @@ mod tests {
     use super::*;
 
     fn shoot(origin: [f32; 3], direction: [f32; 3], corners: &Corners) -> Option<[f32; 3]> {
-        let found = Filter::<1, f32>::new(&origin, &direction, 1).test(corners, true);
+        let found = Filter::<1, f32>::new(&origin, &direction, 1).test(&Triangle::new(*corners), true);
         found.inside.then_some([found.t, found.u, found.v])
     }
 

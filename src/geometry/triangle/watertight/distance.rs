@@ -3,8 +3,7 @@
 //! The paper weights the corners' depths with the edge functions, whose errors grow with the
 //! triangle: on the sides of a square of 900 m `t` was off by up to 5 mm two metres from the ray's
 //! origin, and the weights of a sliver are mostly noise. Here `t` is where the ray meets the
-//! triangle's plane, with a normal from double precision (computed only for the few triangles that
-//! some lane is inside of).
+//! triangle's plane, with a normal from double precision that the triangle's record keeps.
 //!
 //! **What is guaranteed.** The point `origin + t * direction` is within some 16 roundings (of the
 //! greatest distance between origin and corner) of a point *of the triangle*, so it lies in a cell,
@@ -15,7 +14,7 @@
 //! hits where it enters the triangle. Last, `t` is kept between the corners' depths.
 
 use super::Shear;
-use crate::geometry::triangle::{Corners, Lanes3, normal_in_double};
+use crate::geometry::triangle::{Corners, Lanes3, Triangle, normal_in_double};
 use crate::simd::{Lanes, Mask};
 use glam::DVec3;
 
@@ -29,19 +28,18 @@ const SLACK: f32 = 16.0 / (1 << 24) as f32;
 impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// `t` of the lanes in `inside`; `depths` are the corners' along the rays' greatest axes.
     #[inline(always)]
-    pub(super) fn distance(&self, corners: &Corners, inside: L::Mask, depths: &Lanes3<L>) -> L {
-        let normal = normal_in_double(corners);
-        let size = normal.abs().max_element();
-        let (mut t, steep) = if size > 0.0 {
-            self.meet_plane((normal / size).as_vec3().to_array(), &corners[0])
-        } else {
+    pub(super) fn distance(&self, triangle: &Triangle, inside: L::Mask, depths: &Lanes3<L>) -> L {
+        let Triangle { corners, plane } = triangle;
+        let (mut t, steep) = if *plane == [0.0; 3] {
             self.meet_line(corners)
+        } else {
+            self.meet_plane(*plane, &corners[0])
         };
 
         // Clip what grazes, and what has no steepness: NaNs.
         let grazing = inside & !L::splat(GRAZING).le(steep);
         if grazing.any() {
-            t = L::select(grazing, self.clip(corners, normal, t), t);
+            t = L::select(grazing, self.clip(corners, t), t);
         }
 
         let [az, bz, cz] = *depths;
@@ -79,7 +77,8 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
 
     /// Moves `t` to where the rays are between the planes that stand on the triangle's edges.
     #[inline(always)]
-    fn clip(&self, corners: &Corners, normal: DVec3, t: L) -> L {
+    fn clip(&self, corners: &Corners, t: L) -> L {
+        let normal = normal_in_double(corners);
         let points =
             [self.translated(&corners[0]), self.translated(&corners[1]), self.translated(&corners[2])];
         let mut far = L::splat(0.0);

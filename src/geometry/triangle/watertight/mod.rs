@@ -17,7 +17,7 @@
 
 mod distance;
 
-use super::{Candidate, Corners, Lanes3, RENAMED, Test};
+use super::{Candidate, Corners, Lanes3, RENAMED, Test, Triangle};
 use crate::simd::{Lanes, Mask};
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
@@ -71,7 +71,12 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// The same with x and y sheared so that the rays run along z.
     #[inline(always)]
     fn sheared(&self, corner: &[f32; 3]) -> Lanes3<L> {
-        let [x, y, z] = self.translated(corner);
+        self.shear(self.translated(corner))
+    }
+
+    /// A translated point with x and y sheared so that the rays run along z.
+    #[inline(always)]
+    fn shear(&self, [x, y, z]: Lanes3<L>) -> Lanes3<L> {
         let [sx, sy, _] = self.shear;
         [x - sx * z, y - sy * z, z]
     }
@@ -102,7 +107,9 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
 }
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
-    type Record = Corners;
+    type Record = Triangle;
+    /// The corners relative to the apex.
+    type Placed = Corners;
 
     /// Lanes that are not active do not keep the one renaming for all from being taken. A lane
     /// whose direction is zero or not finite gets a shear of NaNs, and so never a hit.
@@ -132,10 +139,35 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     }
 
     #[inline(always)]
-    fn test(&self, corners: &Corners, lanes: L::Mask) -> Candidate<W, L> {
-        let [ax, ay, az] = self.sheared(&corners[0]);
-        let [bx, by, bz] = self.sheared(&corners[1]);
-        let [cx, cy, cz] = self.sheared(&corners[2]);
+    fn test(&self, triangle: &Triangle, lanes: L::Mask) -> Candidate<W, L> {
+        let [a, b, c] = &triangle.corners;
+        self.decide(triangle, [self.sheared(a), self.sheared(b), self.sheared(c)], lanes)
+    }
+
+    #[inline(always)]
+    fn place(triangle: &Triangle, apex: &[f32; 3]) -> Corners {
+        let mut placed = triangle.corners;
+        for corner in &mut placed {
+            for axis in 0..3 {
+                corner[axis] -= apex[axis];
+            }
+        }
+        placed
+    }
+
+    #[inline(always)]
+    fn test_placed(&self, triangle: &Triangle, placed: &Corners, lanes: L::Mask) -> Candidate<W, L> {
+        let [a, b, c] = placed;
+        let [a, b, c] = [self.splat_renamed(a), self.splat_renamed(b), self.splat_renamed(c)];
+        self.decide(triangle, [self.shear(a), self.shear(b), self.shear(c)], lanes)
+    }
+}
+
+impl<const W: usize, L: Lanes<W>> Shear<W, L> {
+    /// The test of a triangle with its corners sheared.
+    #[inline(always)]
+    fn decide(&self, triangle: &Triangle, corners: [Lanes3<L>; 3], lanes: L::Mask) -> Candidate<W, L> {
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
 
         // Edge functions: each is opposite to the corner whose weight it is.
         let mut a = cx * by - cy * bx;
@@ -162,7 +194,7 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
         let sum = a + b + c;
         inside = inside & (sum.lt(zero) | zero.lt(sum));
 
-        let t = self.distance(corners, inside, &[az, bz, cz]);
+        let t = self.distance(triangle, inside, &[az, bz, cz]);
         // No reciprocal: that of a denormal sum would be infinite.
         Candidate { inside, t, u: b / sum, v: c / sum }
     }
@@ -201,7 +233,7 @@ mod tests {
     /// One ray against one triangle: its `t`, or `None`.
     fn shoot(origin: Vec3, direction: Vec3, corners: &[Vec3; 3]) -> Option<f32> {
         let shear = Shear::<1, f32>::new(&origin.to_array(), &direction.to_array(), 1);
-        let found = shear.test(&corners.map(|corner| corner.to_array()), true);
+        let found = shear.test(&Triangle::new(corners.map(|corner| corner.to_array())), true);
         found.inside.then_some(found.t)
     }
 
