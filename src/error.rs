@@ -76,9 +76,14 @@ impl Error {
         Self::Option { option: option.into(), message: message.into() }
     }
 
-    /// An [`Error::Malformed`].
+    /// An [`Error::Malformed`]. What a file's own words bring into the message stays on its line.
     pub fn malformed(path: impl Into<PathBuf>, message: impl Into<String>) -> Self {
-        Self::Malformed { path: path.into(), message: message.into() }
+        let mut message = message.into();
+        if message.contains(char::is_control) {
+            let shown = |c: char| if c.is_control() { c.escape_default().collect() } else { String::from(c) };
+            message = message.chars().map(shown).collect();
+        }
+        Self::Malformed { path: path.into(), message }
     }
 
     /// An [`Error::Malformed`] of what the TOML parser found wrong with a file's text: its first

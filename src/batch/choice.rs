@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 /// The sample: so many runs of rays that follow one another, evenly spread.
 const RUNS: usize = 16;
 
-/// Rays in a run: enough packets that their edges do not count.
-const RUN: usize = 128;
+/// Rays in a run: two of the largest lots that a kernel takes.
+const RUN: usize = 512;
 
 /// Batches below this are traced by [`FOR_FEW`]: the sample would cost more than it saves.
-const FEW: usize = 32 * RUNS * RUN;
+const FEW: usize = 8 * RUNS * RUN;
 
 /// What is good with any rays.
 const FOR_FEW: Kernel = Kernel::Packet8;
@@ -34,7 +34,8 @@ pub(super) fn quickest<A: Copy>(rays: &[Ray], none: A, call: &impl Fn(Kernel, &[
         for (best, kernel) in &mut times {
             let start = Instant::now();
             for run in 0..RUNS {
-                let first = rays.len() / RUNS * run;
+                // From the beginning of a lot, as the whole is traced.
+                let first = rays.len() / RUNS * run / RUN * RUN;
                 call(*kernel, &rays[first..first + RUN], &mut answers);
             }
             *best = start.elapsed().min(*best);

@@ -62,7 +62,7 @@ pub struct Args {
     /// Worker threads; 0 for all processors [default: the profile's]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Rays that are traced together: 1, 4, 8 or 16 [default: what is quickest with a sample of the rays]
+    /// Rays that are traced together: 1, 4, 8, 16 or 256 [default: what is quickest with a sample of the rays]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     /// Settings for building: a name in profiles/ or a TOML file
@@ -137,7 +137,7 @@ impl Args {
     fn kernel(&self) -> Result<Option<Kernel>> {
         let of_width = |width| {
             Kernel::of_width(width)
-                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16")))
+                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 256")))
         };
         self.packet.map(of_width).transpose()
     }
@@ -194,10 +194,7 @@ impl Args {
             "rays",
             format!("{}, {size}, read in {}", grouped(rays), duration(report.rays_read_seconds)),
         );
-        let packets = match report.packet {
-            1 => "single rays".into(),
-            width => format!("packets of {width}"),
-        };
+        let packets = Kernel::of_width(report.packet).map_or("", Kernel::rays);
         let chosen = if self.packet.is_none() { " (chosen)" } else { "" };
         let Engine { version, build } = ENGINE;
         lines.add(

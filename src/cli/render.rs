@@ -54,7 +54,7 @@ pub struct Args {
     /// Keep each worker on one processor
     #[arg(long)]
     pin: bool,
-    /// Rays that are traced together: 1, 4, 8 or 16 [default: the profile's]
+    /// Rays that are traced together: 1, 4, 8, 16 or 256 [default: the profile's]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     /// Side of a tile in pixels [default: the profile's]
@@ -135,8 +135,9 @@ impl Args {
         };
         let packet = match self.packet {
             None => profile.render.packet,
-            Some(width) => Kernel::of_width(width)
-                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16")))?,
+            Some(width) => Kernel::of_width(width).ok_or_else(|| {
+                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 256"))
+            })?,
         };
         let tuning = Tuning {
             packet,

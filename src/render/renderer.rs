@@ -6,7 +6,7 @@ use super::scheduler::{Outcome, Workers};
 use super::settings::RenderSettings;
 use super::shade::Shader;
 use super::stats::{FrameStats, RayCount, Tally};
-use super::tile::{Scratch, TileTask};
+use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::scene::{Camera, Lighting};
@@ -57,15 +57,17 @@ impl<'a> Renderer<'a> {
         tiles_done: &AtomicUsize,
     ) -> (Frame, FrameStats) {
         match self.settings.tuning.packet {
-            Kernel::Single => self.frame_of::<1>(camera, lighting, tiles_done),
-            Kernel::Packet4 => self.frame_of::<4>(camera, lighting, tiles_done),
-            Kernel::Packet8 => self.frame_of::<8>(camera, lighting, tiles_done),
-            Kernel::Packet16 | Kernel::Tile => self.frame_of::<16>(camera, lighting, tiles_done),
+            Kernel::Single => self.frame_of(Calls::<1>::PACKETS, camera, lighting, tiles_done),
+            Kernel::Packet4 => self.frame_of(Calls::<4>::PACKETS, camera, lighting, tiles_done),
+            Kernel::Packet8 => self.frame_of(Calls::<8>::PACKETS, camera, lighting, tiles_done),
+            Kernel::Packet16 => self.frame_of(Calls::<16>::PACKETS, camera, lighting, tiles_done),
+            Kernel::Tile => self.frame_of(Calls::TILES, camera, lighting, tiles_done),
         }
     }
 
     fn frame_of<const W: usize>(
         &self,
+        calls: Calls<W>,
         camera: &Camera,
         lighting: &Lighting,
         tiles_done: &AtomicUsize,
@@ -78,6 +80,7 @@ impl<'a> Renderer<'a> {
         let workers = Workers { threads: tuning.worker_count(), pin: tuning.pin };
         let task = TileTask {
             accel: self.accel,
+            calls,
             shader: Shader::new(self.mesh, lighting, shadows),
             view: camera.view(size.width, size.height),
             samples,

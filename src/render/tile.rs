@@ -10,58 +10,97 @@ use crate::traverse::{Accel, HitPacket, PacketWidth, RayPacket};
 use glam::Vec3;
 use std::time::Instant;
 
-/// Pixels that go through the stages together: enough that reading the clock between stages
-/// costs nothing, few enough that their rays and hits stay in the nearest caches.
-const BATCH: usize = 256;
+/// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
+/// that reading the clock between stages costs nothing, few enough that their rays and hits stay in the
+/// nearest caches.
+const SQUARE: u32 = 16;
+
+/// Pixels in a square.
+const BATCH: usize = (SQUARE * SQUARE) as usize;
+
+/// How a square's packets are traced.
+pub(super) struct Calls<const W: usize> {
+    /// The closest hits of the lanes given with each packet.
+    pub intersect: fn(&Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
+    /// Which of those lanes hit anything.
+    pub occluded: fn(&Accel, &[RayPacket<W>], &[u32], &mut [u32]),
+}
+
+impl<const W: usize> Calls<W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    /// Packet by packet.
+    pub const PACKETS: Self = Self {
+        intersect: |accel, rays, active, hits| {
+            for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
+                *hits = accel.intersect_packet(rays, active);
+            }
+        },
+        occluded: |accel, rays, active, occluded| {
+            for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
+                *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
+            }
+        },
+    };
+}
+
+impl Calls<16> {
+    /// All packets of a square together.
+    pub const TILES: Self = Self { intersect: Accel::intersect_tile, occluded: Accel::occluded_tile };
+}
 
 /// All that a tile's rendering reads.
-pub(super) struct TileTask<'a> {
+pub(super) struct TileTask<'a, const W: usize> {
     pub accel: &'a Accel,
+    pub calls: Calls<W>,
     pub shader: Shader<'a>,
     pub view: View,
     pub samples: u32,
 }
 
 /// One packet's pixels on their way through the stages.
+#[derive(Clone)]
 struct Block<const W: usize> {
     /// The upper left pixel in the tile.
     x: u32,
     y: u32,
-    /// A bit for each lane whose pixel is in the tile.
-    active: u32,
-    rays: RayPacket<W>,
-    hits: HitPacket<W>,
-    shadows: RayPacket<W>,
-    /// A bit for each lane whose shadow ray matters.
-    lit: u32,
     /// Light that a free shadow ray adds.
     key: [Vec3; W],
     /// Light of all samples so far.
     sum: [Vec3; W],
 }
 
-/// What a worker keeps from tile to tile: room for a batch, and its counts.
+/// What a worker keeps from tile to tile: room for a square, packet by packet, and its counts.
 pub(super) struct Scratch<const W: usize> {
     blocks: Vec<Block<W>>,
+    /// A bit for each lane whose pixel is in the tile.
+    active: Vec<u32>,
+    rays: Vec<RayPacket<W>>,
+    hits: Vec<HitPacket<W>>,
+    /// A bit for each lane whose shadow ray matters.
+    lit: Vec<u32>,
+    shadows: Vec<RayPacket<W>>,
+    occluded: Vec<u32>,
     pub camera: Tally,
     pub shadow: Tally,
 }
 
 impl<const W: usize> Scratch<W> {
     pub fn new() -> Self {
-        let block = || Block {
-            x: 0,
-            y: 0,
-            active: 0,
-            rays: RayPacket::empty(),
-            hits: HitPacket::miss(),
-            shadows: RayPacket::empty(),
-            lit: 0,
-            key: [Vec3::ZERO; W],
-            sum: [Vec3::ZERO; W],
-        };
-        let blocks = (0..BATCH / W).map(|_| block()).collect();
-        Self { blocks, camera: Tally::default(), shadow: Tally::default() }
+        let count = BATCH / W;
+        let block = Block { x: 0, y: 0, key: [Vec3::ZERO; W], sum: [Vec3::ZERO; W] };
+        Self {
+            blocks: vec![block; count],
+            active: vec![0; count],
+            rays: vec![RayPacket::empty(); count],
+            hits: vec![HitPacket::miss(); count],
+            lit: vec![0; count],
+            shadows: vec![RayPacket::empty(); count],
+            occluded: vec![0; count],
+            camera: Tally::default(),
+            shadow: Tally::default(),
+        }
     }
 }
 
@@ -93,94 +132,75 @@ fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-impl TileTask<'_> {
+impl<const W: usize> TileTask<'_, W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
     /// Renders a tile into its pixels.
-    pub fn render<const W: usize>(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>)
-    where
-        RayPacket<W>: PacketWidth<W>,
-    {
+    pub fn render(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>) {
         let mut pixels = pixels;
-        let (width, height) = block_size(W);
         let tile = pixels.tile;
-        let columns = tile.width.div_ceil(width);
-        let count = columns * tile.height.div_ceil(height);
-        let batch = scratch.blocks.len() as u32;
-        for start in (0..count).step_by(batch as usize) {
-            let used = batch.min(count - start) as usize;
-            for (index, block) in (start..).zip(&mut scratch.blocks[..used]) {
-                (block.x, block.y) = (index % columns * width, index / columns * height);
-                block.active = lanes_inside::<W>(&tile, block.x, block.y);
-                block.sum = [Vec3::ZERO; W];
+        for y in (0..tile.height).step_by(SQUARE as usize) {
+            for x in (0..tile.width).step_by(SQUARE as usize) {
+                let used = scratch.cover(&tile, x, y);
+                for sample in 0..self.samples {
+                    self.sample(scratch, used, sample, &mut pixels);
+                }
+                self.write(scratch, used, &mut pixels);
             }
-            for sample in 0..self.samples {
-                self.sample_batch(scratch, used, sample, &mut pixels);
-            }
-            self.write(&scratch.blocks[..used], &mut pixels);
         }
     }
 
-    /// Takes one sample of each pixel of a batch: camera rays, shading, shadow rays.
-    fn sample_batch<const W: usize>(
-        &self,
-        scratch: &mut Scratch<W>,
-        used: usize,
-        sample: u32,
-        pixels: &mut TilePixels<'_>,
-    ) where
-        RayPacket<W>: PacketWidth<W>,
-    {
-        let blocks = &mut scratch.blocks[..used];
-        let offset = subpixel(sample);
-
+    /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
+    fn sample(&self, scratch: &mut Scratch<W>, used: usize, sample: u32, pixels: &mut TilePixels<'_>) {
         let start = Instant::now();
-        for block in &mut *blocks {
-            self.trace_camera(block, &pixels.tile, offset);
-            scratch.camera.rays += u64::from(block.active.count_ones());
-        }
+        let active = &scratch.active[..used];
+        self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
+        (self.calls.intersect)(self.accel, &scratch.rays[..used], active, &mut scratch.hits[..used]);
+        scratch.camera.rays += count(active);
         scratch.camera.time += start.elapsed();
 
-        for block in &mut *blocks {
-            self.shade(block, sample == 0, pixels);
+        for packet in 0..used {
+            self.shade(scratch, packet, sample == 0, pixels);
         }
 
         let start = Instant::now();
-        for block in blocks {
-            let occluded = match block.lit {
-                0 => 0,
-                lit => self.accel.occluded_packet(&block.shadows, lit),
-            };
-            for lane in lanes(block.lit & !occluded) {
+        let lit = &scratch.lit[..used];
+        (self.calls.occluded)(self.accel, &scratch.shadows[..used], lit, &mut scratch.occluded[..used]);
+        for ((block, lit), occluded) in scratch.blocks.iter_mut().zip(lit).zip(&scratch.occluded) {
+            for lane in lanes(lit & !occluded) {
                 block.sum[lane] += block.key[lane];
             }
-            scratch.shadow.rays += u64::from(block.lit.count_ones());
         }
+        scratch.shadow.rays += count(lit);
         scratch.shadow.time += start.elapsed();
     }
 
-    fn trace_camera<const W: usize>(&self, block: &mut Block<W>, tile: &Tile, offset: [f32; 2])
-    where
-        RayPacket<W>: PacketWidth<W>,
-    {
+    /// Makes the rays through a point of each pixel.
+    fn make_rays(&self, blocks: &[Block<W>], rays: &mut [RayPacket<W>], tile: &Tile, offset: [f32; 2]) {
         // Lanes beyond the border get rays like the others: they cost nothing and are not traced.
         let width = block_size(W).0;
-        for lane in 0..W as u32 {
-            let (x, y) = (tile.x + block.x + lane % width, tile.y + block.y + lane / width);
-            block.rays.set(lane as usize, &self.view.ray(x, y, offset));
+        for (block, rays) in blocks.iter().zip(rays) {
+            for lane in 0..W as u32 {
+                let (x, y) = (tile.x + block.x + lane % width, tile.y + block.y + lane / width);
+                rays.set(lane as usize, &self.view.ray(x, y, offset));
+            }
         }
-        block.hits = self.accel.intersect_packet(&block.rays, block.active);
     }
 
-    /// Shades a block's hits and makes its shadow rays. The first sample also fills the depth and
+    /// Shades a packet's hits and makes its shadow rays. The first sample also fills the depth and
     /// normal pictures.
-    fn shade<const W: usize>(&self, block: &mut Block<W>, first: bool, pixels: &mut TilePixels<'_>) {
-        block.lit = 0;
-        for lane in lanes(block.active) {
-            let shade = self.shader.shade(&block.rays.get(lane), &block.hits.get(lane));
+    fn shade(&self, scratch: &mut Scratch<W>, packet: usize, first: bool, pixels: &mut TilePixels<'_>) {
+        let block = &mut scratch.blocks[packet];
+        let (rays, hits) = (&scratch.rays[packet], &scratch.hits[packet]);
+        let mut lit = 0;
+        for lane in lanes(scratch.active[packet]) {
+            let shade = self.shader.shade(&rays.get(lane), &hits.get(lane));
             block.sum[lane] += shade.base;
             if let Some(ray) = &shade.shadow {
-                block.shadows.set(lane, ray);
+                scratch.shadows[packet].set(lane, ray);
                 block.key[lane] = shade.key;
-                block.lit |= 1 << lane;
+                lit |= 1 << lane;
             }
             if first {
                 let index = pixel_index::<W>(&pixels.tile, block.x, block.y, lane);
@@ -192,17 +212,41 @@ impl TileTask<'_> {
                 }
             }
         }
+        scratch.lit[packet] = lit;
     }
 
-    fn write<const W: usize>(&self, blocks: &[Block<W>], pixels: &mut TilePixels<'_>) {
+    fn write(&self, scratch: &Scratch<W>, used: usize, pixels: &mut TilePixels<'_>) {
         let weight = 1.0 / self.samples as f32;
-        for block in blocks {
-            for lane in lanes(block.active) {
+        for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
+            for lane in lanes(active) {
                 let index = pixel_index::<W>(&pixels.tile, block.x, block.y, lane);
                 pixels.color[index] = (block.sum[lane] * weight).to_array();
             }
         }
     }
+}
+
+impl<const W: usize> Scratch<W> {
+    /// Lays blocks over the square of a tile at (`x`, `y`), and says how many it takes.
+    fn cover(&mut self, tile: &Tile, x: u32, y: u32) -> usize {
+        let (width, height) = block_size(W);
+        let mut used = 0;
+        for y in (y..tile.height.min(y + SQUARE)).step_by(height as usize) {
+            for x in (x..tile.width.min(x + SQUARE)).step_by(width as usize) {
+                self.active[used] = lanes_inside::<W>(tile, x, y);
+                let block = &mut self.blocks[used];
+                (block.x, block.y) = (x, y);
+                block.sum = [Vec3::ZERO; W];
+                used += 1;
+            }
+        }
+        used
+    }
+}
+
+/// How many lanes are set.
+fn count(lanes: &[u32]) -> u64 {
+    lanes.iter().map(|lanes| u64::from(lanes.count_ones())).sum()
 }
 
 /// Where in the tile's pixels a lane of the block at (`x`, `y`) is.
@@ -221,10 +265,14 @@ mod tests {
         let mut seen = vec![0; tile.pixels()];
         let (width, height) = block_size(W);
         assert_eq!((width * height) as usize, W);
-        for y in (0..tile.height).step_by(height as usize) {
-            for x in (0..tile.width).step_by(width as usize) {
-                for lane in lanes(lanes_inside::<W>(&tile, x, y)) {
-                    seen[pixel_index::<W>(&tile, x, y, lane)] += 1;
+        let mut scratch = Scratch::<W>::new();
+        for y in (0..tile.height).step_by(SQUARE as usize) {
+            for x in (0..tile.width).step_by(SQUARE as usize) {
+                let used = scratch.cover(&tile, x, y);
+                for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
+                    for lane in lanes(active) {
+                        seen[pixel_index::<W>(&tile, block.x, block.y, lane)] += 1;
+                    }
                 }
             }
         }

@@ -16,6 +16,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 pub struct Avx2;
 
 impl Simd for Avx2 {
+    const NATIVE: usize = 8;
     type F4 = F32x4;
     type F8 = F32x8;
     type F16 = Pair<F32x8>;

@@ -14,6 +14,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 pub struct Avx512;
 
 impl Simd for Avx512 {
+    const NATIVE: usize = 16;
     type F4 = avx2::F32x4;
     type F8 = avx2::F32x8;
     type F16 = F32x16;

@@ -105,6 +105,8 @@ pub trait Lanes<const W: usize>:
 
 /// The vector types of an instruction set.
 pub trait Simd {
+    /// Lanes that a register holds, 8 or 16: wider vectors run out of registers in long kernels.
+    const NATIVE: usize;
     /// Four floats.
     type F4: Lanes<4>;
     /// Eight floats.

@@ -9,6 +9,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 pub struct Portable;
 
 impl Simd for Portable {
+    const NATIVE: usize = 8;
     type F4 = F32x4;
     type F8 = F32x8;
     type F16 = F32x16;

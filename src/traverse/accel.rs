@@ -411,7 +411,7 @@ impl<M: Mode> Task for IntersectTile<'_, M> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, records, rays, active, hits } = self;
-        tile::intersect::<S::F16, _, M, _>(tree, records, rays, active, hits, &mut ())
+        tile::intersect::<S, _, M, _>(tree, records, rays, active, hits, &mut ())
     }
 }
 
@@ -428,7 +428,7 @@ impl<M: Mode> Task for OccludedTile<'_, M> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        tile::occluded::<S::F16, _, M>(self.tree, self.records, self.rays, self.active, self.found)
+        tile::occluded::<S, _, M>(self.tree, self.records, self.rays, self.active, self.found)
     }
 }
 
@@ -446,6 +446,6 @@ impl Task for CountTile<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, rays, active, hits, counts } = self;
-        tile::intersect::<S::F16, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
+        tile::intersect::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
     }
 }

@@ -43,6 +43,17 @@ impl Kernel {
         }
     }
 
+    /// What it traces together, in words.
+    pub const fn rays(self) -> &'static str {
+        match self {
+            Self::Single => "single rays",
+            Self::Packet4 => "packets of 4",
+            Self::Packet8 => "packets of 8",
+            Self::Packet16 => "packets of 16",
+            Self::Tile => "beams of 256",
+        }
+    }
+
     /// The kernel that traces `width` rays together, if there is one.
     pub fn of_width(width: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|kernel| kernel.width() == width)

@@ -5,6 +5,7 @@ use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
 use crate::geometry::Accuracy;
 use crate::render::{FrameStats, RayCount, RenderSettings, Size};
 use crate::scene::Camera;
+use crate::traverse::Kernel;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -87,8 +88,7 @@ impl<'a> Report<'a> {
             all if all == self.threads => "pinned".into(),
             some => format!("{some} pinned"),
         };
-        let packets =
-            if self.packet == 1 { "single rays".into() } else { format!("packets of {}", self.packet) };
+        let packets = Kernel::of_width(self.packet).map_or("", Kernel::rays);
         lines.add(
             "engine",
             format!(

@@ -85,6 +85,15 @@ pub struct Lines<const W: usize, L: Lanes<W>> {
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     type Record = Projected;
     type Placed = ();
+    type Kept = ();
+
+    #[inline(always)]
+    fn keep(_direction: &Lanes3<L>, _axis: usize) {}
+
+    #[inline(always)]
+    fn revive(_kept: &(), apex: &[f32; 3], direction: &Lanes3<L>, _axis: usize) -> Self {
+        Self { origin: [L::splat(apex[0]), L::splat(apex[1]), L::splat(apex[2])], direction: *direction }
+    }
 
     #[inline(always)]
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, _active: u32) -> Self {

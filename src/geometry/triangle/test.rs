@@ -15,9 +15,19 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     type Record;
     /// What rays that start at one point can share of a triangle.
     type Placed: Copy + Default;
+    /// What is kept of rays that start at one point and whose directions are greatest along one axis, to
+    /// be prepared again in no time.
+    type Kept: Copy + Default;
 
     /// Prepares `W` rays. `active` has a bit for each lane that matters.
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
+
+    /// What to keep of rays whose directions are greatest along `axis`.
+    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept;
+
+    /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept. Only for
+    /// [`test_placed`](Self::test_placed) and [`test`](Self::test).
+    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self;
 
     /// One triangle against the lanes in `lanes`; what the others answer means nothing.
     ///
@@ -36,7 +46,12 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What [`test`](Self::test) answers, to the bit, if all lanes that matter start at the apex that
     /// `placed` was prepared for. (Other lanes' answers mean nothing.)
     #[inline(always)]
-    fn test_placed(&self, triangle: &Self::Record, _placed: &Self::Placed, lanes: L::Mask) -> Candidate<W, L> {
+    fn test_placed(
+        &self,
+        triangle: &Self::Record,
+        _placed: &Self::Placed,
+        lanes: L::Mask,
+    ) -> Candidate<W, L> {
         self.test(triangle, lanes)
     }
 

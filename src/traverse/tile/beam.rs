@@ -1,7 +1,8 @@
 //! A tile's rays as one object: a beam of sixteen packets that part from one point.
 //!
 //! **Frame.** The axis along which the beam's first ray runs fastest becomes z (renamed cyclically, and
-//! turned so that rays run up along it). A ray is `(a z, b z, z)` there, with the *slopes* `a` and `b`;
+//! turned so that rays run up along it); all rays must run fastest along it. A ray is `(a z, b z, z)`
+//! there, with the *slopes* `a` and `b`, of less than 1;
 //! `z` is the *depth*, `t` times the speed along that axis. Depth takes the place of `t` in the walk: it
 //! means the same for all rays of the beam, whatever their directions' lengths.
 //!
@@ -36,9 +37,6 @@ use crate::traverse::walk::{Interval, MARGIN};
 
 /// Packets in a beam.
 pub const PACKETS: usize = 16;
-
-/// Greatest slope: beyond, the frame would do its rays no justice.
-const STEEPEST: f32 = 2.0;
 
 /// What rates and depths are widened by, outward: more than the few roundings that are in them.
 const WIDEN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -126,7 +124,7 @@ impl<L: Lanes<16>> Beam<L> {
             }
             for side in 0..2 {
                 let slope = L::load(&rays.direction[axes[side]]) / forward;
-                belongs = belongs & slope.abs().le(L::splat(STEEPEST));
+                belongs = belongs & slope.abs().lt(L::splat(1.0));
                 low[side][packet] = L::select(counts, slope, infinite).least();
                 high[side][packet] = L::select(counts, slope, zero - infinite).greatest();
             }
@@ -212,19 +210,6 @@ impl<L: Lanes<16>> Beam<L> {
             leave: L::splat(way + self.thickness) * rate.greatest,
             enter: L::splat(way - self.thickness) * rate.least,
         }
-    }
-
-    /// The depth of what is `t` along a packet's rays, at most.
-    #[inline(always)]
-    pub fn depth(&self, rays: &RayPacket<16>, t: L) -> L {
-        t * L::load(&rays.direction[self.axes[2]]).abs() * L::splat(WIDEN)
-    }
-
-    /// The intervals of `t` of a packet's rays for depths from `tmin` to `tmax`.
-    #[inline(always)]
-    pub fn along(&self, rays: &RayPacket<16>, tmin: f32, tmax: f32) -> Interval<L> {
-        let speed = L::load(&rays.direction[self.axes[2]]).abs();
-        Interval { tmin: L::splat(tmin * NARROW) / speed, tmax: L::splat(tmax) * L::splat(WIDEN) / speed }
     }
 }
 

@@ -7,30 +7,55 @@ use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask};
 use crate::traverse::closest::Closest;
-use crate::traverse::lanes::RayPacket;
-use crate::traverse::walk::{Interval, load3};
+use crate::traverse::lanes::{HitPacket, RayPacket};
+use crate::traverse::packet::descend;
+use crate::traverse::walk::{Interval, Walk};
+
+/// Most parts that sixteen packets are traced in: halves, where registers hold eight lanes.
+const PARTS: usize = 2 * PACKETS;
+
+/// What the tests of `N` rays keep for a beam.
+type Kept<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Kept;
+
+/// A triangle as the tests see it from a beam's apex.
+type Placed<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Placed;
 
 /// A tile's rays on their way.
-pub struct Tile<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> {
+///
+/// Packets stand in the lanes of `L`, as the beam has them. Rays stand in the lanes of `R`, as many as a
+/// register holds: part `i` of packet `p` is at `p * (16 / N) + i`.
+pub struct Tile<'a, L, R, T, M, const N: usize, const ANY: bool>
+where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+{
     pub tree: &'a T,
     pub records: &'a [M::Record],
-    pub rays: &'a [RayPacket<16>],
+    rays: &'a [RayPacket<16>],
     /// Which lanes of each packet count.
-    pub active: &'a [u32; PACKETS],
+    active: &'a [u32; PACKETS],
     pub beam: &'a Beam<L>,
-    /// The packets' tests, as the packet kernel makes them.
-    pub tests: [M::Test<16, L>; PACKETS],
-    pub closest: [Closest<16, L>; PACKETS],
+    kept: [Kept<M, R, N>; PARTS],
+    closest: [Closest<N, R>; PARTS],
     /// The depth beyond which no ray of a packet looks for anything any more.
     pub reach: [f32; PACKETS],
     /// What the packets see of the scene, depths apart.
     window: Window<L>,
     block: Block,
-    /// The block's triangles that are left, as their test sees them from the beam's apex.
-    placed: [<M::Test<16, L> as Test<16, L>>::Placed; 16],
+    /// The block's triangles that are left.
+    placed: [Placed<M, R, N>; 16],
 }
 
-impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY> {
+impl<'a, L, R, T, M, const N: usize, const ANY: bool> Tile<'a, L, R, T, M, N, ANY>
+where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+{
+    /// The rays at their start.
     #[inline(always)]
     pub fn new(
         tree: &'a T,
@@ -39,31 +64,75 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
         active: &'a [u32; PACKETS],
         beam: &'a Beam<L>,
     ) -> Self {
-        let zero = [L::splat(0.0); 3];
-        let mut tests = [M::Test::<16, L>::new(&zero, &zero, 0); PACKETS];
-        let mut closest = [Closest::new(L::splat(f32::NEG_INFINITY)); PACKETS];
-        for (packet, rays) in rays.iter().enumerate() {
-            let counts = L::mask_from_bits(active[packet]);
-            tests[packet] =
-                M::Test::<16, L>::new(&load3(&rays.origin), &load3(&rays.direction), active[packet]);
-            // Lanes that do not count have found what they look for.
-            let tfar = L::select(counts, L::load(&rays.tfar), L::splat(f32::NEG_INFINITY));
-            closest[packet] = Closest::new(tfar);
-        }
         let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
-        Self {
+        let mut tile = Self {
             tree,
             records,
             rays,
             active,
             beam,
-            tests,
-            closest,
+            kept: [Default::default(); PARTS],
+            closest: [Closest::new(R::splat(f32::NEG_INFINITY)); PARTS],
             reach: [f32::INFINITY; PACKETS],
             window: Window::new(beam.low, beam.high, never, ever),
             block: Block::new(),
-            placed: Default::default(),
+            placed: [Default::default(); 16],
+        };
+        for packet in 0..rays.len().min(PACKETS) {
+            for part in 0..16 / N {
+                let rays = &rays[packet];
+                let place = packet * (16 / N) + part;
+                let direction = load_part3::<N, R>(&rays.direction, part);
+                tile.kept[place] = M::Test::<N, R>::keep(&direction, beam.axes[2]);
+                // Lanes that do not count have found what they look for.
+                let tfar = R::select(
+                    tile.counts(packet, part),
+                    load_part::<N, R>(&rays.tfar, part),
+                    R::splat(f32::NEG_INFINITY),
+                );
+                tile.closest[place] = Closest::new(tfar);
+            }
         }
+        tile
+    }
+
+    /// The lanes of a part that count.
+    #[inline(always)]
+    fn counts(&self, packet: usize, part: usize) -> R::Mask {
+        R::mask_from_bits(self.active[packet] >> (part * N) & ((1 << N) - 1))
+    }
+
+    /// A part's test.
+    #[inline(always)]
+    fn part_test(&self, packet: usize, part: usize) -> M::Test<N, R> {
+        let direction = load_part3::<N, R>(&self.rays[packet].direction, part);
+        let kept = &self.kept[packet * (16 / N) + part];
+        M::Test::<N, R>::revive(kept, &self.beam.apex, &direction, self.beam.axes[2])
+    }
+
+    /// Writes a packet's hits.
+    #[inline(always)]
+    pub fn give(&self, packet: usize, hits: &mut HitPacket<16>) {
+        for part in 0..16 / N {
+            let found = self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, self.records);
+            *part_mut(&mut hits.t, part) = found.t;
+            *part_mut(&mut hits.u, part) = found.u;
+            *part_mut(&mut hits.v, part) = found.v;
+            *part_mut(&mut hits.primitive, part) = found.primitive;
+            for axis in 0..3 {
+                *part_mut(&mut hits.normal[axis], part) = found.normal[axis];
+            }
+        }
+    }
+
+    /// A packet's lanes that found something.
+    #[inline(always)]
+    pub fn found(&self, packet: usize) -> u32 {
+        let mut found = 0;
+        for part in 0..16 / N {
+            found |= self.closest[packet * (16 / N) + part].found() << (part * N);
+        }
+        found & self.active[packet]
     }
 
     /// Looks for hits among a page's triangles, for the packets in `live` in their depths.
@@ -91,7 +160,7 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
 
             for triangle in bits(left) {
                 let record = &self.records[primitives[triangle] as usize];
-                self.placed[triangle] = M::Test::<16, L>::place(record, &self.beam.apex);
+                self.placed[triangle & 15] = M::Test::<N, R>::place(record, &self.beam.apex);
             }
 
             // Cull for packets, the rarer of packets and triangles one by one.
@@ -124,27 +193,117 @@ impl<'a, L: Lanes<16>, T: Tree, M: Mode, const ANY: bool> Tile<'a, L, T, M, ANY>
     #[inline(always)]
     fn test(&mut self, packet: usize, primitives: &[u32], chosen: u32) {
         let packet = packet & 15;
-        let test = &self.tests[packet];
-        let mut closest = self.closest[packet];
-        let tnear = L::load(&self.rays[packet].tnear);
-        let live = L::mask_from_bits(self.active[packet]);
         let mut changed = false;
-        for triangle in bits(chosen) {
-            let primitive = primitives[triangle];
-            let candidate = test.test_placed(&self.records[primitive as usize], &self.placed[triangle & 15], live);
-            changed |= closest.take::<ANY>(&candidate, primitive, tnear, live);
+        for part in 0..16 / N {
+            let test = self.part_test(packet, part);
+            let place = packet * (16 / N) + part;
+            let mut closest = self.closest[place];
+            let tnear = load_part::<N, R>(&self.rays[packet].tnear, part);
+            let live = self.counts(packet, part);
+            let mut part_changed = false;
+            for triangle in bits(chosen) {
+                let primitive = primitives[triangle];
+                let placed = &self.placed[triangle & 15];
+                let candidate = test.test_placed(&self.records[primitive as usize], placed, live);
+                part_changed |= closest.take::<ANY>(&candidate, primitive, tnear, live);
+            }
+            if part_changed {
+                self.closest[place] = closest;
+            }
+            changed |= part_changed;
         }
         if changed {
-            self.closest[packet] = closest;
             self.shorten(packet);
         }
     }
 
     /// Draws a packet's reach in to what its rays still look for.
     #[inline(always)]
-    pub fn shorten(&mut self, packet: usize) {
-        self.reach[packet] = self.beam.depth(&self.rays[packet], self.closest[packet].t).greatest();
+    fn shorten(&mut self, packet: usize) {
+        let mut reach = f32::NEG_INFINITY;
+        for part in 0..16 / N {
+            let speed = load_part::<N, R>(&self.rays[packet].direction[self.beam.axes[2]], part).abs();
+            let depth = (self.closest[packet * (16 / N) + part].t * speed).greatest();
+            reach = if depth > reach { depth } else { reach };
+        }
+        self.reach[packet] = reach + reach.abs() * ROUNDINGS;
     }
+
+    /// One packet walks on by itself, through the full tree below a place of the upper one, from the
+    /// depth `tmin` to `tmax`.
+    #[inline(always)]
+    pub fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
+        let all = &self.rays[packet];
+        let mut changed = false;
+        for part in 0..16 / N {
+            let rays = RayPacket::<N> {
+                origin: [
+                    *part_of(&all.origin[0], part),
+                    *part_of(&all.origin[1], part),
+                    *part_of(&all.origin[2], part),
+                ],
+                direction: [
+                    *part_of(&all.direction[0], part),
+                    *part_of(&all.direction[1], part),
+                    *part_of(&all.direction[2], part),
+                ],
+                tnear: *part_of(&all.tnear, part),
+                tfar: *part_of(&all.tfar, part),
+            };
+            let active = self.active[packet] >> (part * N) & ((1 << N) - 1);
+            let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
+            let speed = R::load(&rays.direction[self.beam.axes[2]]).abs();
+            let mut closest = self.closest[packet * (16 / N) + part];
+            let interval = Interval {
+                tmin: (R::splat(tmin - tmin.abs() * ROUNDINGS) / speed).max(inside.tmin),
+                tmax: (R::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(closest.t),
+            };
+            if interval.live().any() {
+                let test = self.part_test(packet, part);
+                let tnear = R::load(&rays.tnear);
+                let node = self.tree.beneath(place);
+                descend::<N, R, T, M, ANY>(
+                    self.tree,
+                    self.records,
+                    &walk,
+                    &test,
+                    tnear,
+                    node,
+                    interval,
+                    &mut closest,
+                );
+                self.closest[packet * (16 / N) + part] = closest;
+                changed = true;
+            }
+        }
+        if changed {
+            self.shorten(packet);
+        }
+    }
+}
+
+/// What depths are widened by, relative to themselves.
+const ROUNDINGS: f32 = 1.0 / (1 << 20) as f32;
+
+/// A part of a packet's row.
+#[inline(always)]
+fn part_of<const N: usize, V>(row: &[V; 16], part: usize) -> &[V; N] {
+    &row.as_chunks::<N>().0[part]
+}
+
+#[inline(always)]
+fn part_mut<const N: usize, V>(row: &mut [V; 16], part: usize) -> &mut [V; N] {
+    &mut row.as_chunks_mut::<N>().0[part]
+}
+
+#[inline(always)]
+fn load_part<const N: usize, R: Lanes<N>>(row: &[f32; 16], part: usize) -> R {
+    R::load(part_of(row, part))
+}
+
+#[inline(always)]
+fn load_part3<const N: usize, R: Lanes<N>>(rows: &[[f32; 16]; 3], part: usize) -> [R; 3] {
+    [load_part(&rows[0], part), load_part(&rows[1], part), load_part(&rows[2], part)]
 }
 
 /// What some of a window's packets see together.

@@ -24,13 +24,12 @@ pub use beam::PACKETS;
 pub use probe::{Probe, TileCounts};
 
 use super::lanes::{HitPacket, RayPacket};
-use super::packet::descend;
 use super::range::is_ordinary;
 use super::stack::Stack;
-use super::walk::{Interval, Walk};
+use super::walk::Interval;
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Mask};
+use crate::simd::{Lanes, Mask, Simd};
 use beam::Beam;
 use leaf::Tile;
 
@@ -47,7 +46,7 @@ struct Waiting<L> {
 /// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
 /// `false`, and nothing done, if the rays are no beam.
 #[inline(always)]
-pub fn intersect<L: Lanes<16>, T: Tree, M: Mode, P: Probe>(
+pub fn intersect<S: Simd, T: Tree, M: Mode, P: Probe>(
     tree: &T,
     records: &[M::Record],
     rays: &[RayPacket<16>],
@@ -55,11 +54,19 @@ pub fn intersect<L: Lanes<16>, T: Tree, M: Mode, P: Probe>(
     hits: &mut [HitPacket<16>],
     probe: &mut P,
 ) -> bool {
-    let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
-    let mut tile = Tile::<L, T, M, false>::new(tree, records, rays, active, &beam);
-    walk(&mut tile, interval, probe);
-    for (hits, closest) in hits.iter_mut().zip(&tile.closest) {
-        *hits = closest.records::<T, M>(tree, records);
+    let Some((beam, interval)) = beam::<S::F16, T>(tree, rays, active) else { return false };
+    if S::NATIVE == 16 {
+        let mut tile = Tile::<_, S::F16, T, M, 16, false>::new(tree, records, rays, active, &beam);
+        walk(&mut tile, interval, probe);
+        for (packet, hits) in hits.iter_mut().enumerate() {
+            tile.give(packet, hits);
+        }
+    } else {
+        let mut tile = Tile::<_, S::F8, T, M, 8, false>::new(tree, records, rays, active, &beam);
+        walk(&mut tile, interval, probe);
+        for (packet, hits) in hits.iter_mut().enumerate() {
+            tile.give(packet, hits);
+        }
     }
     true
 }
@@ -67,18 +74,26 @@ pub fn intersect<L: Lanes<16>, T: Tree, M: Mode, P: Probe>(
 /// The lanes in `active` that hit anything, packet by packet. `false`, and nothing done, if the rays
 /// are no beam.
 #[inline(always)]
-pub fn occluded<L: Lanes<16>, T: Tree, M: Mode>(
+pub fn occluded<S: Simd, T: Tree, M: Mode>(
     tree: &T,
     records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     found: &mut [u32],
 ) -> bool {
-    let Some((beam, interval)) = beam::<L, T>(tree, rays, active) else { return false };
-    let mut tile = Tile::<L, T, M, true>::new(tree, records, rays, active, &beam);
-    walk(&mut tile, interval, &mut ());
-    for (packet, found) in found.iter_mut().enumerate() {
-        *found = tile.closest[packet].found() & active[packet];
+    let Some((beam, interval)) = beam::<S::F16, T>(tree, rays, active) else { return false };
+    if S::NATIVE == 16 {
+        let mut tile = Tile::<_, S::F16, T, M, 16, true>::new(tree, records, rays, active, &beam);
+        walk(&mut tile, interval, &mut ());
+        for (packet, found) in found.iter_mut().enumerate() {
+            *found = tile.found(packet);
+        }
+    } else {
+        let mut tile = Tile::<_, S::F8, T, M, 8, true>::new(tree, records, rays, active, &beam);
+        walk(&mut tile, interval, &mut ());
+        for (packet, found) in found.iter_mut().enumerate() {
+            *found = tile.found(packet);
+        }
     }
     true
 }
@@ -100,11 +115,17 @@ fn beam<L: Lanes<16>, T: Tree>(
 
 /// Walks the upper tree with all packets of a tile.
 #[inline(always)]
-fn walk<L: Lanes<16>, T: Tree, M: Mode, P: Probe, const ANY: bool>(
-    tile: &mut Tile<'_, L, T, M, ANY>,
+fn walk<L, R, T, M, P, const N: usize, const ANY: bool>(
+    tile: &mut Tile<'_, L, R, T, M, N, ANY>,
     mut interval: Interval<L>,
     probe: &mut P,
-) {
+) where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+    P: Probe,
+{
     let (tree, beam) = (tile.tree, tile.beam);
     let mut live = interval.live().bits();
     if live == 0 {
@@ -123,7 +144,12 @@ fn walk<L: Lanes<16>, T: Tree, M: Mode, P: Probe, const ANY: bool>(
             }
             if live.count_ones() <= FEW {
                 probe.alone(live.count_ones());
-                go_alone(tile, place, &interval, live);
+                let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
+                while live != 0 {
+                    let packet = live.trailing_zeros() as usize & 15;
+                    live &= live - 1;
+                    tile.go_alone(packet, place, tmin[packet], tmax[packet]);
+                }
                 break;
             }
             let crossing = beam.crossing(node.axis(), node.split());
@@ -156,39 +182,5 @@ fn walk<L: Lanes<16>, T: Tree, M: Mode, P: Probe, const ANY: bool>(
             }
         }
         node = tree.upper(place);
-    }
-}
-
-/// The packets in `live` walk on by themselves, through the full tree.
-#[inline(always)]
-fn go_alone<L: Lanes<16>, T: Tree, M: Mode, const ANY: bool>(
-    tile: &mut Tile<'_, L, T, M, ANY>,
-    place: usize,
-    interval: &Interval<L>,
-    mut live: u32,
-) {
-    let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
-    while live != 0 {
-        let packet = live.trailing_zeros() as usize;
-        live &= live - 1;
-        let rays = &tile.rays[packet];
-        let (walk, inside) = Walk::<16, L>::new(rays, tile.active[packet], tile.tree.bounds());
-        let along = tile.beam.along(rays, tmin[packet], tmax[packet]);
-        let closest = &mut tile.closest[packet];
-        let interval =
-            Interval { tmin: along.tmin.max(inside.tmin), tmax: along.tmax.min(inside.tmax).min(closest.t) };
-        if interval.live().any() {
-            descend::<16, L, T, M, ANY>(
-                tile.tree,
-                tile.records,
-                &walk,
-                &tile.tests[packet],
-                L::load(&rays.tnear),
-                tile.tree.beneath(place),
-                interval,
-                closest,
-            );
-            tile.shorten(packet);
-        }
     }
 }

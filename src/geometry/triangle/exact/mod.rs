@@ -26,6 +26,21 @@ pub struct Filter<const W: usize, L: Lanes<W>> {
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     type Record = Triangle;
     type Placed = ();
+    type Kept = <Shear<W, L> as Test<W, L>>::Kept;
+
+    #[inline(always)]
+    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept {
+        Shear::keep(direction, axis)
+    }
+
+    #[inline(always)]
+    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self {
+        Self {
+            shear: Shear::revive(kept, apex, direction, axis),
+            origin: apex.map(|coordinate| [coordinate; W]),
+            direction: [direction[0].store(), direction[1].store(), direction[2].store()],
+        }
+    }
 
     #[inline(always)]
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self {

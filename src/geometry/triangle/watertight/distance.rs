@@ -30,11 +30,8 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     #[inline(always)]
     pub(super) fn distance(&self, triangle: &Triangle, inside: L::Mask, depths: &Lanes3<L>) -> L {
         let Triangle { corners, plane } = triangle;
-        let (mut t, steep) = if *plane == [0.0; 3] {
-            self.meet_line(corners)
-        } else {
-            self.meet_plane(*plane, &corners[0])
-        };
+        let (mut t, steep) =
+            if *plane == [0.0; 3] { self.meet_line(corners) } else { self.meet_plane(*plane, &corners[0]) };
 
         // Clip what grazes, and what has no steepness: NaNs.
         let grazing = inside & !L::splat(GRAZING).le(steep);

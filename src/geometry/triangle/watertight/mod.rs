@@ -106,10 +106,45 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     }
 }
 
+/// `(dx/dz, dy/dz, 1/dz)` in renamed coordinates, kept.
+#[derive(Clone, Copy)]
+pub struct Sheared<const W: usize, L: Lanes<W>>(Lanes3<L>);
+
+impl<const W: usize, L: Lanes<W>> Default for Sheared<W, L> {
+    #[inline(always)]
+    fn default() -> Self {
+        Self([L::splat(0.0); 3])
+    }
+}
+
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     type Record = Triangle;
     /// The corners relative to the apex.
     type Placed = Corners;
+    /// The shear.
+    type Kept = Sheared<W, L>;
+
+    #[inline(always)]
+    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept {
+        let [i, j, k] = RENAMED[axis];
+        let [dx, dy, dz] = [direction[i], direction[j], direction[k]];
+        Sheared([dx / dz, dy / dz, L::splat(1.0) / dz])
+    }
+
+    #[inline(always)]
+    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self {
+        let [i, j, k] = RENAMED[axis];
+        // With one axis for all, nobody asks which lanes have it.
+        let nobody = L::mask_from_bits(0);
+        Self {
+            major: Some(axis),
+            major_x: nobody,
+            major_y: nobody,
+            origin: [L::splat(apex[i]), L::splat(apex[j]), L::splat(apex[k])],
+            direction: [direction[i], direction[j], direction[k]],
+            shear: kept.0,
+        }
+    }
 
     /// Lanes that are not active do not keep the one renaming for all from being taken. A lane
     /// whose direction is zero or not finite gets a shear of NaNs, and so never a hit.

@@ -35,10 +35,10 @@ impl fmt::Display for Report {
         let r = &self.reference;
         writeln!(
             f,
-            "\nFrames: {}, shading and shadows included, packets of {}, tiles of {t}x{t}; errors against the\n\
+            "\nFrames: {}, shading and shadows included, {}, tiles of {t}x{t}; errors against the\n\
              reference ({}, {} samples per pixel, rendered in {:.1} s)\n",
             h.size,
-            h.tuning.packet.width(),
+            h.tuning.packet.rays(),
             r.accuracy,
             r.samples,
             r.seconds,

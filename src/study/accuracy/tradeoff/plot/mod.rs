@@ -219,9 +219,9 @@ fn frame_panel(report: &Report) -> Panel {
     Panel {
         title: "frames".into(),
         subtitle: format!(
-            "{}, shadows, packets of {}; reference: {}, {} spp",
+            "{}, shadows, {}; reference: {}, {} spp",
             h.size,
-            h.tuning.packet.width(),
+            h.tuning.packet.rays(),
             r.accuracy,
             r.samples
         ),
