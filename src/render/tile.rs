@@ -1,5 +1,6 @@
 //! Rendering one tile: its pixels in small blocks, a packet to each.
 
+use super::choice::Choice;
 use super::frame::TilePixels;
 use super::order::Tile;
 use super::sampling::subpixel;
@@ -20,11 +21,15 @@ const BATCH: usize = (SQUARE * SQUARE) as usize;
 
 /// How a square's packets are traced.
 pub(super) struct Calls<const W: usize> {
-    /// The closest hits of the lanes given with each packet.
-    pub intersect: fn(&Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
+    /// The closest hits of the lanes given with each packet: together, if there is a way, and packet by
+    /// packet.
+    together: Option<Intersect<W>>,
+    intersect: Intersect<W>,
     /// Which of those lanes hit anything.
-    pub occluded: fn(&Accel, &[RayPacket<W>], &[u32], &mut [u32]),
+    occluded: fn(&Accel, &[RayPacket<W>], &[u32], &mut [u32]),
 }
+
+type Intersect<const W: usize> = fn(&Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]);
 
 impl<const W: usize> Calls<W>
 where
@@ -32,6 +37,7 @@ where
 {
     /// Packet by packet.
     pub const PACKETS: Self = Self {
+        together: None,
         intersect: |accel, rays, active, hits| {
             for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
                 *hits = accel.intersect_packet(rays, active);
@@ -46,8 +52,9 @@ where
 }
 
 impl Calls<16> {
-    /// All packets of a square together.
-    pub const TILES: Self = Self { intersect: Accel::intersect_tile, occluded: Accel::occluded_tile };
+    /// All camera rays of a square together where that is quicker. (Shadow rays do not start at one
+    /// point.)
+    pub const TILES: Self = Self { together: Some(Accel::intersect_tile), ..Self::PACKETS };
 }
 
 /// All that a tile's rendering reads.
@@ -82,6 +89,7 @@ pub(super) struct Scratch<const W: usize> {
     lit: Vec<u32>,
     shadows: Vec<RayPacket<W>>,
     occluded: Vec<u32>,
+    choice: Choice,
     pub camera: Tally,
     pub shadow: Tally,
 }
@@ -98,6 +106,7 @@ impl<const W: usize> Scratch<W> {
             lit: vec![0; count],
             shadows: vec![RayPacket::empty(); count],
             occluded: vec![0; count],
+            choice: Choice::default(),
             camera: Tally::default(),
             shadow: Tally::default(),
         }
@@ -156,9 +165,14 @@ where
         let start = Instant::now();
         let active = &scratch.active[..used];
         self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
-        (self.calls.intersect)(self.accel, &scratch.rays[..used], active, &mut scratch.hits[..used]);
-        scratch.camera.rays += count(active);
-        scratch.camera.time += start.elapsed();
+        let tracing = Instant::now();
+        let way = if self.calls.together.is_some() { scratch.choice.next() } else { 1 };
+        let call = if way == 0 { self.calls.together } else { None }.unwrap_or(self.calls.intersect);
+        call(self.accel, &scratch.rays[..used], active, &mut scratch.hits[..used]);
+        let (now, rays) = (Instant::now(), count(active));
+        scratch.choice.record(way, rays, now - tracing);
+        scratch.camera.rays += rays;
+        scratch.camera.time += now - start;
 
         for packet in 0..used {
             self.shade(scratch, packet, sample == 0, pixels);

@@ -31,7 +31,8 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     }
 
     /// Takes up what a triangle's test found in the lanes `live`: the least `t`, then the lowest id.
-    /// With `ANY` a lane is done at its first hit. Says whether anything changed.
+    /// With `ANY` a lane is done at its first hit; `weights` says whether those of the candidate are kept.
+    /// Says whether anything changed.
     #[inline(always)]
     pub fn take<const ANY: bool>(
         &mut self,
@@ -39,6 +40,7 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
         primitive: u32,
         tnear: L,
         live: L::Mask,
+        weights: bool,
     ) -> bool {
         let mut hit = candidate.inside & live;
         if !hit.any() {
@@ -53,8 +55,10 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
             self.t = L::select(hit, L::splat(f32::NEG_INFINITY), self.t);
         } else {
             self.t = L::select(hit, candidate.t, self.t);
-            self.u = L::select(hit, candidate.u, self.u);
-            self.v = L::select(hit, candidate.v, self.v);
+            if weights {
+                self.u = L::select(hit, candidate.u, self.u);
+                self.v = L::select(hit, candidate.v, self.v);
+            }
         }
         true
     }
@@ -65,9 +69,15 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
         L::ids_less(self.primitive, L::ids(NONE)).bits()
     }
 
-    /// Hit records, with what belongs to the triangles filled in.
+    /// Hit records, with what belongs to the triangles filled in. If weights were not kept, `test` finds
+    /// them again.
     #[inline(always)]
-    pub fn records<T: Tree, M: Mode>(&self, tree: &T, records: &[M::Record]) -> HitPacket<W> {
+    pub fn records<T: Tree, M: Mode>(
+        &self,
+        tree: &T,
+        records: &[M::Record],
+        test: Option<&M::Test<W, L>>,
+    ) -> HitPacket<W> {
         let found = L::ids_less(self.primitive, L::ids(NONE));
         let ids = L::ids_store(L::ids_select(found, self.primitive, L::ids(NO_PRIMITIVE as i32)));
         let zero = L::splat(0.0);
@@ -80,7 +90,14 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
             let id = ids[rest.trailing_zeros() as usize % W];
             let lanes = !(L::ids_less(self.primitive, L::ids(id)) | L::ids_less(L::ids(id), self.primitive));
             rest &= !lanes.bits();
-            let weights = M::Test::<W, L>::weights(&records[id as usize], self.u, self.v);
+            let record = &records[id as usize];
+            let weights = match test {
+                Some(test) => {
+                    let candidate = test.test(record, lanes);
+                    M::Test::<W, L>::weights(record, candidate.u, candidate.v)
+                }
+                None => M::Test::<W, L>::weights(record, self.u, self.v),
+            };
             let along = triangle::normal(tree.corners(id as u32));
             u = L::select(lanes, weights[0], u);
             v = L::select(lanes, weights[1], v);

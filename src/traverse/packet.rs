@@ -36,7 +36,8 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
 ) -> HitPacket<W> {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let mut hits = walk::<W, L, T, M, false>(tree, records, traced, active).records::<T, M>(tree, records);
+    let mut hits =
+        walk::<W, L, T, M, false>(tree, records, traced, active).records::<T, M>(tree, records, None);
     if let Some(adapted) = adapted {
         adapted.undo(rays, &mut hits, tree);
     }
@@ -125,7 +126,7 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
             let live = interval.live();
             for &primitive in primitives {
                 let candidate = test.test(&records[primitive as usize], live);
-                closest.take::<ANY>(&candidate, primitive, tnear, live);
+                closest.take::<ANY>(&candidate, primitive, tnear, live, true);
             }
         }
 

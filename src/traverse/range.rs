@@ -14,8 +14,8 @@ use crate::kdtree::{Scale, Tree, exponent};
 use crate::simd::{Lanes, Mask};
 
 /// A direction's greatest component is at least this and less than the other.
-const LEAST: f32 = 1.0 / (1 << 30) as f32;
-const LIMIT: f32 = (1u32 << 31) as f32;
+pub const LEAST: f32 = 1.0 / (1 << 30) as f32;
+pub const LIMIT: f32 = (1u32 << 31) as f32;
 
 /// Whether all lanes in `active` can be traced as they are.
 #[inline(always)]

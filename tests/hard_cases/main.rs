@@ -24,6 +24,7 @@ mod numbers;
 mod scene;
 
 mod axis_parallel;
+mod beams;
 mod degenerate;
 mod garbage;
 mod grazing;

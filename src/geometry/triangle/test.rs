@@ -37,11 +37,25 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// gap that so opens between its neighbours.
     fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
 
-    /// A triangle prepared for rays that all start at `apex`.
+    /// A triangle prepared for rays that all start at `apex` and run fastest along `axis`: up, if `sign`
+    /// is 1, or down, if it is -1.
+    ///
+    /// `edges` tells the sides on which a ray passes the triangle's edges: with `x` and `y` its slopes
+    /// along the next two axes relative to its speed along this one, `edge[0] x + edge[1] y + edge[2]` is
+    /// off by less than `edge[3]`, any mode's own errors included.
     #[inline(always)]
-    fn place(_triangle: &Self::Record, _apex: &[f32; 3]) -> Self::Placed {
+    fn place(
+        _triangle: &Self::Record,
+        _apex: &[f32; 3],
+        _axis: usize,
+        _sign: f32,
+        _edges: &[[f32; 4]; 3],
+    ) -> Self::Placed {
         Self::Placed::default()
     }
+
+    /// Whether `test_placed` gives no weights, for [`test`](Self::test) to be asked for them in the end.
+    const DEFERS: bool = false;
 
     /// What [`test`](Self::test) answers, to the bit, if all lanes that matter start at the apex that
     /// `placed` was prepared for. (Other lanes' answers mean nothing.)

@@ -33,6 +33,7 @@
 use crate::geometry::Aabb;
 use crate::simd::{Lanes, Mask};
 use crate::traverse::lanes::RayPacket;
+use crate::traverse::range::{LEAST, LIMIT};
 use crate::traverse::walk::{Interval, MARGIN};
 
 /// Packets in a beam.
@@ -117,8 +118,9 @@ impl<L: Lanes<16>> Beam<L> {
             let forward = L::load(&rays.direction[axis]) * L::splat(sign);
             let tnear = L::load(&rays.tnear);
             let tfar = L::load(&rays.tfar);
-            // A NaN anywhere fails these, and so does an infinite speed.
-            let mut belongs = zero.lt(forward) & zero.le(tnear) & tfar.le(infinite);
+            // A NaN anywhere fails these. The speed forward is the direction's greatest component.
+            let ordinary = L::splat(LEAST).le(forward) & forward.lt(L::splat(LIMIT));
+            let mut belongs = ordinary & zero.le(tnear) & tfar.le(infinite);
             for (axis, &coordinate) in apex.iter().enumerate() {
                 belongs = belongs & L::load(&rays.origin[axis]).eq(L::splat(coordinate));
             }

@@ -114,7 +114,10 @@ where
     #[inline(always)]
     pub fn give(&self, packet: usize, hits: &mut HitPacket<16>) {
         for part in 0..16 / N {
-            let found = self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, self.records);
+            let test = self.part_test(packet, part);
+            let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
+            let found =
+                self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, self.records, again);
             *part_mut(&mut hits.t, part) = found.t;
             *part_mut(&mut hits.u, part) = found.u;
             *part_mut(&mut hits.v, part) = found.v;
@@ -148,7 +151,7 @@ where
         for primitives in page.chunks(16) {
             // Cull for the beam.
             for (lane, &primitive) in primitives.iter().enumerate() {
-                self.block.set(lane, self.tree.triangle(primitive), &self.beam.axes);
+                self.block.set(lane, self.tree.triangle(primitive));
             }
             let outline = self.block.outline(self.beam);
             let present = (1 << primitives.len()) - 1;
@@ -160,7 +163,9 @@ where
 
             for triangle in bits(left) {
                 let record = &self.records[primitives[triangle] as usize];
-                self.placed[triangle & 15] = M::Test::<N, R>::place(record, &self.beam.apex);
+                let Beam { apex, axes, sign, .. } = self.beam;
+                self.placed[triangle & 15] =
+                    M::Test::<N, R>::place(record, apex, axes[2], *sign, &self.block.edges_of(triangle));
             }
 
             // Cull for packets, the rarer of packets and triangles one by one.
@@ -205,7 +210,8 @@ where
                 let primitive = primitives[triangle];
                 let placed = &self.placed[triangle & 15];
                 let candidate = test.test_placed(&self.records[primitive as usize], placed, live);
-                part_changed |= closest.take::<ANY>(&candidate, primitive, tnear, live);
+                part_changed |=
+                    closest.take::<ANY>(&candidate, primitive, tnear, live, !M::Test::<N, R>::DEFERS);
             }
             if part_changed {
                 self.closest[place] = closest;

@@ -24,7 +24,6 @@ pub use beam::PACKETS;
 pub use probe::{Probe, TileCounts};
 
 use super::lanes::{HitPacket, RayPacket};
-use super::range::is_ordinary;
 use super::stack::Stack;
 use super::walk::Interval;
 use crate::geometry::triangle::Mode;
@@ -34,7 +33,7 @@ use beam::Beam;
 use leaf::Tile;
 
 /// So many packets, or fewer, go on alone.
-const FEW: u32 = 2;
+const FEW: u32 = 1;
 
 /// A subtree that waits for its turn, with the packets' depths in it.
 #[derive(Clone, Copy)]
@@ -105,12 +104,7 @@ fn beam<L: Lanes<16>, T: Tree>(
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
 ) -> Option<(Beam<L>, Interval<L>)> {
-    for (rays, &active) in rays.iter().zip(active) {
-        if !is_ordinary::<16, L>(rays, active, tree.scale()) {
-            return None;
-        }
-    }
-    Beam::new(rays, active, tree.bounds())
+    if tree.scale().is_none() { Beam::new(rays, active, tree.bounds()) } else { None }
 }
 
 /// Walks the upper tree with all packets of a tile.

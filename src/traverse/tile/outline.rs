@@ -112,7 +112,7 @@ type Row = [f32; 16];
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub struct Block {
-    /// `corners[corner][axis]`, axes renamed as in the beam's frame.
+    /// `corners[corner][axis]`, in the scene's axes.
     corners: [[Row; 3]; 3],
     /// Their planes' normals, likewise.
     normal: [Row; 3],
@@ -143,13 +143,13 @@ impl Block {
 
     /// Puts a triangle into a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, triangle: &Triangle, axes: &[usize; 3]) {
+    pub fn set(&mut self, lane: usize, triangle: &Triangle) {
         let lane = lane & 15;
         for i in 0..3 {
             for j in 0..3 {
-                self.corners[i][j][lane] = triangle.corners[i][axes[j]];
+                self.corners[i][j][lane] = triangle.corners[i][j];
             }
-            self.normal[i][lane] = triangle.plane[axes[i]];
+            self.normal[i][lane] = triangle.plane[i];
         }
     }
 
@@ -163,7 +163,7 @@ impl Block {
         let mut far = zero;
         for corner in 0..3 {
             for axis in 0..3 {
-                let place = L::load(&self.corners[corner][axis]);
+                let place = L::load(&self.corners[corner][beam.axes[axis]]);
                 original[corner][axis] = place;
                 let offset = place - L::splat(apex[axis]);
                 far = far.max(offset.abs());
@@ -207,9 +207,9 @@ impl Block {
         // The plane, turned so that the apex is behind it. Too near, it may be on either side; so it is
         // for a triangle without area, whose normal is zero.
         let n = [
-            L::load(&self.normal[0]),
-            L::load(&self.normal[1]),
-            L::load(&self.normal[2]) * L::splat(beam.sign),
+            L::load(&self.normal[beam.axes[0]]),
+            L::load(&self.normal[beam.axes[1]]),
+            L::load(&self.normal[beam.axes[2]]) * L::splat(beam.sign),
         ];
         let distance = n[0] * points[0][0] + n[1] * points[0][1] + n[2] * points[0][2];
         let sure = slack.lt(distance.abs());
@@ -238,6 +238,19 @@ impl Block {
         }
         self.near = outline.near.store();
         self.far = outline.far.store();
+    }
+
+    /// The edges of one lane's triangle: coefficients over the slopes, and slacks.
+    #[inline(always)]
+    pub fn edges_of(&self, lane: usize) -> [[f32; 4]; 3] {
+        let lane = lane & 15;
+        let mut edges = [[0.0; 4]; 3];
+        for i in 0..3 {
+            for j in 0..4 {
+                edges[i][j] = self.edges[i][j][lane];
+            }
+        }
+        edges
     }
 
     /// The outline of one lane's triangle, in every lane.

@@ -30,14 +30,9 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     #[inline(always)]
     pub(super) fn distance(&self, triangle: &Triangle, inside: L::Mask, depths: &Lanes3<L>) -> L {
         let Triangle { corners, plane } = triangle;
-        let (mut t, steep) =
+        let (t, speed) =
             if *plane == [0.0; 3] { self.meet_line(corners) } else { self.meet_plane(*plane, &corners[0]) };
-
-        // Clip what grazes, and what has no steepness: NaNs.
-        let grazing = inside & !L::splat(GRAZING).le(steep);
-        if grazing.any() {
-            t = L::select(grazing, self.clip(corners, t), t);
-        }
+        let t = self.clip_grazing(corners, inside, t, speed);
 
         let [az, bz, cz] = *depths;
         let scale = self.shear[2];
@@ -46,15 +41,29 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         t.max(nearest).min(farthest)
     }
 
-    /// Where the rays meet a plane, and how steeply: the speed along the normal, relative to that
-    /// along the greatest axis.
+    /// Where the rays meet a plane, and their speed along its normal.
     #[inline(always)]
     fn meet_plane(&self, normal: [f32; 3], point: &[f32; 3]) -> (L, L) {
-        let [nx, ny, nz] = self.splat_renamed(&normal);
-        let [px, py, pz] = self.translated(point);
+        let normal = self.splat_renamed(&normal);
+        let ([nx, ny, nz], [px, py, pz]) = (normal, self.translated(point));
+        self.meet(&normal, nx * px + ny * py + nz * pz)
+    }
+
+    /// The same for a plane at a height along its normal, renamed, from the origins.
+    #[inline(always)]
+    pub(super) fn meet(&self, [nx, ny, nz]: &Lanes3<L>, height: L) -> (L, L) {
         let [dx, dy, dz] = self.direction;
-        let speed = nx * dx + ny * dy + nz * dz;
-        ((nx * px + ny * py + nz * pz) / speed, (speed / dz).abs())
+        let speed = *nx * dx + *ny * dy + *nz * dz;
+        (height / speed, speed)
+    }
+
+    /// Clips `t` where rays graze the plane: where the speed along its normal is small beside that along
+    /// the greatest axis, or is none (a NaN).
+    #[inline(always)]
+    pub(super) fn clip_grazing(&self, corners: &Corners, inside: L::Mask, t: L, speed: L) -> L {
+        let least = L::splat(GRAZING) * self.direction[2].abs();
+        let grazing = inside & !least.le(speed.abs());
+        if grazing.any() { L::select(grazing, self.clip(corners, t), t) } else { t }
     }
 
     /// Where the rays pass a triangle that is no more than a line. (It has to be hit: neighbours on
@@ -66,10 +75,10 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         let (e, f) = (p1 - p0, p2 - p0);
         let along = if e.length_squared() > f.length_squared() { e } else { f };
         let (one, other) = along.normalize_or(DVec3::X).any_orthonormal_pair();
-        let (t, steep) = self.meet_plane(one.as_vec3().to_array(), &corners[0]);
-        let (u, steeper) = self.meet_plane(other.as_vec3().to_array(), &corners[0]);
-        let better = steep.lt(steeper);
-        (L::select(better, u, t), L::select(better, steeper, steep))
+        let (t, slow) = self.meet_plane(one.as_vec3().to_array(), &corners[0]);
+        let (u, fast) = self.meet_plane(other.as_vec3().to_array(), &corners[0]);
+        let better = slow.abs().lt(fast.abs());
+        (L::select(better, u, t), L::select(better, fast, slow))
     }
 
     /// Moves `t` to where the rays are between the planes that stand on the triangle's edges.

@@ -16,9 +16,11 @@
 //! it would only turn all three signs round.
 
 mod distance;
+mod placed;
 
 use super::{Candidate, Corners, Lanes3, RENAMED, Test, Triangle};
 use crate::simd::{Lanes, Mask};
+use placed::Placed;
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
 #[derive(Clone, Copy)]
@@ -119,8 +121,8 @@ impl<const W: usize, L: Lanes<W>> Default for Sheared<W, L> {
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     type Record = Triangle;
-    /// The corners relative to the apex.
-    type Placed = Corners;
+    type Placed = Placed;
+    const DEFERS: bool = true;
     /// The shear.
     type Kept = Sheared<W, L>;
 
@@ -180,21 +182,13 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     }
 
     #[inline(always)]
-    fn place(triangle: &Triangle, apex: &[f32; 3]) -> Corners {
-        let mut placed = triangle.corners;
-        for corner in &mut placed {
-            for axis in 0..3 {
-                corner[axis] -= apex[axis];
-            }
-        }
-        placed
+    fn place(triangle: &Triangle, apex: &[f32; 3], axis: usize, sign: f32, edges: &[[f32; 4]; 3]) -> Placed {
+        Placed::new(triangle, apex, axis, sign, edges)
     }
 
     #[inline(always)]
-    fn test_placed(&self, triangle: &Triangle, placed: &Corners, lanes: L::Mask) -> Candidate<W, L> {
-        let [a, b, c] = placed;
-        let [a, b, c] = [self.splat_renamed(a), self.splat_renamed(b), self.splat_renamed(c)];
-        self.decide(triangle, [self.shear(a), self.shear(b), self.shear(c)], lanes)
+    fn test_placed(&self, triangle: &Triangle, placed: &Placed, lanes: L::Mask) -> Candidate<W, L> {
+        self.test_beam(triangle, placed, lanes)
     }
 }
 

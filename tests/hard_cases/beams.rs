@@ -1,0 +1,160 @@
+//! Rays from one point, in the order in which a picture's are: what the tile kernel takes together.
+//! (Elsewhere most rays come from everywhere, and it hands them on to packets.)
+
+use crate::meshes::{cube, floor, globe, joined, mapped, of_triangles, sphere, twisted_ring};
+use crate::numbers::{Numbers, seeds};
+use crate::scene::Scene;
+use raypack::Vec3;
+use raypack::geometry::Ray;
+use raypack::kdtree::BuildParams;
+use raypack::mesh::Mesh;
+use raypack::traverse::{Accel, RayPacket, TileCounts};
+
+/// Rays from a point, sorted by where they go: neighbours go nearly the same way.
+fn sorted(eye: Vec3, targets: impl IntoIterator<Item = Vec3>) -> Vec<Ray> {
+    let mut rays: Vec<Ray> = targets
+        .into_iter()
+        .map(|target| Ray::new(eye, target - eye))
+        .filter(|ray| ray.direction != Vec3::ZERO)
+        .collect();
+    rays.sort_by_cached_key(|ray| {
+        let d = ray.direction;
+        let axis =
+            if d.x.abs() >= d.y.abs().max(d.z.abs()) { 0 } else { 1 + usize::from(d.z.abs() > d.y.abs()) };
+        let along = d[axis];
+        let cell = |i: usize| (d[(axis + i) % 3] / along.abs() * 4.0).floor() as i32;
+        (axis, along < 0.0, cell(1), cell(2), (d[(axis + 2) % 3] / along.abs() * 16.0).floor() as i32)
+    });
+    rays
+}
+
+/// A square picture, in blocks of 16 x 16.
+fn picture(eye: Vec3, at: Vec3, size: u32, fov: f32) -> Vec<Ray> {
+    let forward = (at - eye).normalize();
+    let right = forward.any_orthogonal_vector().normalize();
+    let up = right.cross(forward);
+    let step = 2.0 * (fov.to_radians() * 0.5).tan() / size as f32;
+    let ray = |i: u32| {
+        let (block, pixel) = (i / 256, i % 256);
+        let (x, y) = (block % (size / 16) * 16 + pixel % 16, block / (size / 16) * 16 + pixel / 16);
+        let place = |i: u32| (i as f32 + 0.5 - size as f32 * 0.5) * step;
+        Ray::new(eye, forward + right * place(x) + up * place(y))
+    };
+    (0..size * size).map(ray).collect()
+}
+
+/// How many lots of 256 rays are beams.
+fn beams(mesh: &Mesh, rays: &[Ray]) -> u64 {
+    let accel = Accel::build(mesh, &BuildParams::default()).expect("builds");
+    let mut counts = TileCounts::default();
+    for rays in rays.chunks_exact(256) {
+        let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+        accel.count_tile(&packets, &[0xffff; 16], &mut counts);
+    }
+    counts.beams
+}
+
+#[test]
+fn beams_at_the_seams_of_closed_surfaces_do_not_pass() {
+    let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
+    let ring = twisted_ring(48, 6, 1);
+    for closed in [
+        sphere(3),
+        cube(8),
+        globe(12, 30),
+        sphere(3).placed("far", 100.0, far),
+        ring.placed("small", 1e-3, Vec3::ONE),
+    ] {
+        let mut scene = Scene::new(&closed.name, 0, closed.mesh.clone());
+        for seed in seeds() {
+            scene.seed = seed;
+            let mut numbers = Numbers::new(seed, 40);
+            let eye = closed.inside(&mut numbers);
+            let targets: Vec<Vec3> = (0..2560)
+                .map(|_| {
+                    let triangle = numbers.pick(&closed.mesh.triangles);
+                    let first = numbers.below(3);
+                    let [a, b] =
+                        [first, (first + 1) % 3].map(|k| closed.mesh.positions[triangle[k] as usize]);
+                    if numbers.below(2) == 0 { a } else { a + (b - a) * numbers.unit() }
+                })
+                .collect();
+            let rays = sorted(eye, targets);
+            assert!(beams(&closed.mesh, &rays) > 0, "{}: hardly a beam", closed.name);
+            scene.check_closed(&rays);
+        }
+    }
+}
+
+#[test]
+fn pictures_of_all_sorts_are_the_same_by_every_kernel() {
+    let walls = |seed| {
+        // Large and small, crossing each other: walls that reach past the eye, needles, dust.
+        let mut numbers = Numbers::new(seed, 41);
+        of_triangles((0..400).map(|i| {
+            let size = [30.0, 3.0, 0.3, 0.01][i % 4];
+            let (a, b) = (numbers.vector() * 10.0, numbers.vector() * size);
+            let c =
+                if i % 5 == 0 { b * 0.5 + numbers.vector() * size * 1e-5 } else { numbers.vector() * size };
+            [a, a + b, a + c]
+        }))
+    };
+    for seed in seeds() {
+        let mut numbers = Numbers::new(seed, 42);
+        let ball = sphere(3).mesh;
+        let lines = of_triangles((0..200).map(|_| {
+            let (a, b) = (numbers.vector() * 3.0, numbers.vector());
+            [a, a + b, a + b * 2.0]
+        }));
+        let meshes = [
+            ("walls", walls(seed)),
+            ("balls in a hall", joined([&ball, &mapped(&ball, |p| p * 40.0), &mapped(&ball, |p| p * 0.01)])),
+            ("two floors in one", joined([&floor(8), &floor(8), &floor(3)])),
+            ("lines", joined([&lines, &ball])),
+        ];
+        for (name, mesh) in meshes {
+            let mut scene = Scene::new(name, seed, mesh);
+            let corner = numbers.pick(&scene.mesh.positions);
+            let views = [
+                // Straight along an axis, zeros in the directions.
+                (Vec3::new(0.25, 0.5, 3.0), Vec3::new(0.25, 0.5, 0.0), 60.0),
+                // From a corner's own place, and so on planes that split.
+                (corner, Vec3::splat(0.1), 80.0),
+                (numbers.vector() * 5.0, numbers.vector(), 20.0),
+                // So that all rays meet next to nothing.
+                (numbers.vector() * 4000.0, numbers.vector(), 0.02),
+            ];
+            for (eye, at, fov) in views {
+                let rays = picture(eye, at, 32, fov);
+                scene.trace(&rays);
+            }
+            let rays = picture(Vec3::new(0.25, 0.5, 3.0), Vec3::new(0.25, 0.5, 0.0), 32, 60.0);
+            assert_eq!(beams(&scene.mesh, &rays), 4, "{name}");
+        }
+    }
+}
+
+#[test]
+fn intervals_are_kept_by_beams_too() {
+    let ball = sphere(3).mesh;
+    let mesh = joined([&ball, &mapped(&ball, |p| p * 1.5), &mapped(&ball, |p| p * 2.0)]);
+    let mut scene = Scene::new("three shells", 0, mesh);
+    for seed in seeds() {
+        scene.seed = seed;
+        let mut numbers = Numbers::new(seed, 43);
+        let mut rays = picture(Vec3::ZERO, numbers.direction(), 32, 50.0);
+        for ray in &mut rays {
+            let length = ray.direction.length();
+            // From within one shell to within another, to nowhere, or the wrong way round.
+            let [from, to] = [numbers.unit(), numbers.unit()].map(|x| x * 2.5 / length);
+            match numbers.below(4) {
+                0 => (ray.tnear, ray.tfar) = (from.min(to), from.max(to)),
+                1 => ray.tfar = to,
+                2 => ray.tnear = from,
+                _ => (ray.tnear, ray.tfar) = (from, to),
+            }
+        }
+        scene.trace(&rays);
+        assert!(beams(&scene.mesh, &rays) > 0);
+    }
+}
