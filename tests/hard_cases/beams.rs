@@ -158,3 +158,30 @@ fn intervals_are_kept_by_beams_too() {
         assert!(beams(&scene.mesh, &rays) > 0);
     }
 }
+
+/// Rays from one point all over a surface of many triangles, in no order: no packet's rays are alike.
+#[test]
+fn beams_that_do_not_pay_are_given_up() {
+    let closed = sphere(5);
+    let mut scene = Scene::new("sprayed", 0, closed.mesh.clone());
+    for seed in seeds() {
+        scene.seed = seed;
+        let mut numbers = Numbers::new(seed, 44);
+        let eye = closed.inside(&mut numbers);
+        let along = numbers.direction();
+        let spray: Vec<Vec3> = (0..1024).map(|_| along + numbers.vector() * 0.3).collect();
+        let rays: Vec<Ray> = spray.iter().map(|&direction| Ray::new(eye, direction)).collect();
+        scene.check_closed(&rays);
+
+        let accel = Accel::build(&scene.mesh, &BuildParams::default()).expect("builds");
+        let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+        let mut counts = TileCounts::default();
+        for packets in packets.chunks(16) {
+            accel.count_tile(packets, &[0xffff; 16], &mut counts);
+        }
+        if counts.beams > 0 {
+            assert!(counts.tests < 2048 * counts.beams, "{counts:?}");
+            assert!(counts.alone >= 16 * counts.beams, "{counts:?}");
+        }
+    }
+}

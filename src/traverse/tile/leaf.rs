@@ -11,6 +11,16 @@ use crate::traverse::lanes::{HitPacket, RayPacket};
 use crate::traverse::packet::descend;
 use crate::traverse::walk::{Interval, Walk};
 
+/// The work after which a tile is given up: some five times what a tile takes whose rays are worth
+/// tracing together. Rays that are not, because each packet's go all over the place, or because there are
+/// many triangles between one ray and the next, would meet every triangle in a packet's window.
+pub const WORK: u32 = 4096;
+
+/// The work of a block, of culling a triangle for packets, and of a packet's test.
+const BLOCK_WORK: u32 = 12;
+const CULL_WORK: u32 = 3;
+const TEST_WORK: u32 = 4;
+
 /// Most parts that sixteen packets are traced in: halves, where registers hold eight lanes.
 const PARTS: usize = 2 * PACKETS;
 
@@ -41,6 +51,8 @@ where
     closest: [Closest<N, R>; PARTS],
     /// The depth beyond which no ray of a packet looks for anything any more.
     pub reach: [f32; PACKETS],
+    /// What was done for the tile so far, in steps of about one upper node.
+    pub work: u32,
     /// What the packets see of the scene, depths apart.
     window: Window<L>,
     block: Block,
@@ -74,6 +86,7 @@ where
             kept: [Default::default(); PARTS],
             closest: [Closest::new(R::splat(f32::NEG_INFINITY)); PARTS],
             reach: [f32::INFINITY; PACKETS],
+            work: 0,
             window: Window::new(beam.low, beam.high, never, ever),
             block: Block::new(),
             placed: [Default::default(); 16],
@@ -149,6 +162,10 @@ where
         (window.nearest, window.farthest) = (interval.tmin, interval.tmax);
         let all = union(&window, L::mask_from_bits(live));
         for primitives in page.chunks(16) {
+            if self.work > WORK {
+                return;
+            }
+            self.work += BLOCK_WORK;
             // Cull for the beam.
             for (lane, &primitive) in primitives.iter().enumerate() {
                 self.block.set(lane, self.tree.triangle(primitive));
@@ -168,6 +185,8 @@ where
                     M::Test::<N, R>::place(record, apex, axes[2], *sign, &self.block.edges_of(triangle));
             }
 
+            self.work += left.count_ones().min(live.count_ones()) * CULL_WORK;
+
             // Cull for packets, the rarer of packets and triangles one by one.
             let mut chosen = [0; PACKETS];
             if left.count_ones() <= live.count_ones() {
@@ -186,6 +205,7 @@ where
             // Test what is left.
             for packet in bits(live) {
                 if chosen[packet & 15] != 0 {
+                    self.work += chosen[packet & 15].count_ones() * TEST_WORK;
                     probe.tests(chosen[packet & 15].count_ones());
                     self.test(packet, primitives, chosen[packet & 15]);
                 }

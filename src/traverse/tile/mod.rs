@@ -13,7 +13,8 @@
 //! 4. `leaf`: what is left is tested by the mode's own test, sixteen rays against one triangle, as the
 //!    packet kernel does, and so with the same answers to the bit.
 //! 5. Where no more than [`FEW`] packets of the beam are left at a node, each goes on alone as a
-//!    packet through the full tree below.
+//!    packet through the full tree below; and so does every packet, from the start, of a tile that has
+//!    taken so much work that its rays cannot be alike.
 
 mod beam;
 mod leaf;
@@ -30,7 +31,7 @@ use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask, Simd};
 use beam::Beam;
-use leaf::Tile;
+use leaf::{Tile, WORK};
 
 /// So many packets, or fewer, go on alone.
 const FEW: u32 = 1;
@@ -125,12 +126,15 @@ fn walk<L, R, T, M, P, const N: usize, const ANY: bool>(
     if live == 0 {
         return;
     }
+    let start = interval;
     let mut place = 0;
     let mut node = tree.upper(place);
     let mut stack = Stack::new();
     loop {
         // Descend to a page, leaving far children on the stack.
+        let mut nodes = 0;
         loop {
+            nodes += 1;
             probe.node(live.count_ones());
             if node.is_leaf() {
                 tile.visit(tree.page(node), &interval, live, probe);
@@ -162,6 +166,18 @@ fn walk<L, R, T, M, P, const N: usize, const ANY: bool>(
                 (place, interval, live) = (near_place, near, in_near);
             }
             node = tree.upper(place);
+        }
+
+        // Where it does not pay, each packet goes on alone from the start, with what was found as its bound.
+        tile.work += nodes;
+        if tile.work > WORK {
+            let (tmin, tmax) = (start.tmin.store(), L::load(&tile.reach).min(start.tmax).store());
+            let packets = start.live().bits();
+            probe.alone(packets.count_ones());
+            for packet in (0..PACKETS).filter(|packet| packets >> packet & 1 == 1) {
+                tile.go_alone(packet, 0, tmin[packet], tmax[packet]);
+            }
+            return;
         }
 
         // Take up the next subtree that some packet can still find something nearer in.
