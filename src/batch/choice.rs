@@ -8,13 +8,13 @@ use crate::traverse::Kernel;
 use std::time::{Duration, Instant};
 
 /// The sample: so many runs of rays that follow one another, evenly spread.
-const RUNS: usize = 16;
+const RUNS: usize = 8;
 
-/// Rays in a run: two of the largest lots that a kernel takes.
-const RUN: usize = 512;
+/// Rays in a run: the largest lot that a kernel takes.
+const RUN: usize = 256;
 
 /// Batches below this are traced by [`FOR_FEW`]: the sample would cost more than it saves.
-const FEW: usize = 8 * RUNS * RUN;
+const FEW: usize = 32 * RUNS * RUN;
 
 /// What is good with any rays.
 const FOR_FEW: Kernel = Kernel::Packet8;
