@@ -116,7 +116,7 @@ fn render_writes_the_picture_and_says_what_it_did() {
         "shadow ",
         "total ",
         "2 threads",
-        "packets of 16",
+        "beams of 256",
         "40x30",
     ] {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
