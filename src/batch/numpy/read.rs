@@ -70,7 +70,8 @@ pub fn read_rays(path: impl AsRef<Path>) -> Result<Vec<Ray>> {
 }
 
 /// The same from anything that gives a file's bytes: `length` of them, if that is known, so that an array
-/// that cannot be whole is refused before memory is set aside for it. `path` is what errors name.
+/// that cannot be whole is refused at once. If it is not known, the rays' memory grows with what comes,
+/// whatever the header announces. `path` is what errors name.
 ///
 /// # Errors
 /// As for [`read_rays`].
@@ -93,29 +94,35 @@ pub fn read_rays_from(mut source: impl Read, length: Option<u64>, path: &Path) -
             layout.rays
         )));
     }
-    let mut rays = Vec::new();
-    let count = usize::try_from(layout.rays).ok().filter(|&count| rays.try_reserve_exact(count).is_ok());
-    let Some(count) = count else {
-        return Err(malformed(format!(
+    let too_many = || {
+        malformed(format!(
             "{} rays of 32 bytes are more than the memory holds; cast them in parts",
             layout.rays
-        )));
+        ))
     };
+    let count = usize::try_from(layout.rays).map_err(|_| too_many())?;
+    let mut rays = Vec::new();
+    if left.is_some() {
+        rays.try_reserve_exact(count).map_err(|_| too_many())?;
+    }
     if layout.fortran_order {
         read_columns(&mut source, count, layout.big_endian, &mut rays)
     } else {
         read_rows(&mut source, count, layout.big_endian, &mut rays)
     }
-    .map_err(failed)?;
+    .map_err(|error| if error.kind() == io::ErrorKind::OutOfMemory { too_many() } else { failed(error) })?;
     Ok(rays)
 }
 
 /// Rows of a C-ordered array.
 fn read_rows(source: &mut impl Read, count: usize, big_endian: bool, rays: &mut Vec<Ray>) -> io::Result<()> {
-    read_floats(source, count * COLUMNS, big_endian, |_, floats| {
+    let floats = count.checked_mul(COLUMNS).ok_or(io::ErrorKind::OutOfMemory)?;
+    read_floats(source, floats, big_endian, |_, floats| {
+        rays.try_reserve(floats.len() / COLUMNS)?;
         rays.extend(floats.as_chunks::<COLUMNS>().0.iter().map(|&[ox, oy, oz, tnear, dx, dy, dz, tfar]| {
             Ray::segment(Vec3::new(ox, oy, oz), Vec3::new(dx, dy, dz), tnear, tfar)
         }));
+        Ok(())
     })
 }
 
@@ -129,6 +136,7 @@ fn read_columns(
     for column in 0..COLUMNS {
         read_floats(source, count, big_endian, |first, floats| {
             if column == 0 {
+                rays.try_reserve(floats.len())?;
                 rays.extend(floats.iter().map(|_| Ray::segment(Vec3::ZERO, Vec3::ZERO, 0.0, 0.0)));
             }
             for (ray, &value) in rays[first..].iter_mut().zip(floats) {
@@ -139,6 +147,7 @@ fn read_columns(
                     _ => ray.tfar = value,
                 }
             }
+            Ok(())
         })?;
     }
     Ok(())
@@ -149,7 +158,7 @@ fn read_floats(
     source: &mut impl Read,
     count: usize,
     big_endian: bool,
-    mut take: impl FnMut(usize, &[f32]),
+    mut take: impl FnMut(usize, &[f32]) -> io::Result<()>,
 ) -> io::Result<()> {
     const PART: usize = 1 << 14;
     let mut bytes = vec![0; PART.min(count) * FLOAT];
@@ -164,7 +173,7 @@ fn read_floats(
         } else {
             floats.extend(words.map(|&word| f32::from_le_bytes(word)));
         }
-        take(first, &floats);
+        take(first, &floats)?;
     }
     Ok(())
 }
@@ -205,14 +214,17 @@ mod tests {
 
     #[test]
     fn absurd_counts_set_no_memory_aside() {
-        for count in ["1000000000000", "18446744073709551615", "99999999999999999999999"] {
-            let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 8), }}");
-            let file = npy(&header, [0.0; 16]);
-            for length in [None, Some(file.len() as u64)] {
-                let message = read_rays_from(&file[..], length, Path::new("a.npy"))
-                    .expect_err("it cannot be whole")
-                    .to_string();
-                assert!(message.starts_with("a.npy: "), "{message}");
+        for count in ["518011763", "1000000000000", "18446744073709551615", "99999999999999999999999"] {
+            for fortran in ["False", "True"] {
+                let header =
+                    format!("{{'descr': '<f4', 'fortran_order': {fortran}, 'shape': ({count}, 8), }}");
+                let file = npy(&header, [0.0; 16]);
+                for length in [None, Some(file.len() as u64)] {
+                    let message = read_rays_from(&file[..], length, Path::new("a.npy"))
+                        .expect_err("it cannot be whole")
+                        .to_string();
+                    assert!(message.starts_with("a.npy: "), "{message}");
+                }
             }
         }
     }
