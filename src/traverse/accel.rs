@@ -201,17 +201,17 @@ impl Accel {
         }
     }
 
-    /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, in watertight mode.
-    pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], counts: &mut TileCounts) {
-        let mut hits = [const { HitPacket::miss() }; PACKETS];
+    /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, or, with `any_hit`,
+    /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode.
+    pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
         let (tree, active) = (&*self.tree, &tile_lanes(rays, active));
-        let hits = &mut hits[..rays.len()];
-        let done = self.chosen.run(CountTile { tree, rays, active, hits, counts });
+        let done = self.chosen.run(CountTile { tree, rays, active, any_hit, counts });
         counts.beams += u64::from(done);
     }
 
-    /// A bit for each lane set in `active` in whose interval anything lies, packet by packet; otherwise as
-    /// [`intersect_tile`](Self::intersect_tile).
+    /// A bit for each lane set in `active` in whose interval anything lies, packet by packet. Rays go
+    /// together if they start at one point, or run toward one and no farther (it need not be named), or
+    /// are parallel; otherwise as [`intersect_tile`](Self::intersect_tile).
     pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         let lanes = tile_lanes(rays, active);
@@ -428,7 +428,7 @@ impl<M: Mode> Task for OccludedTile<'_, M> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        tile::occluded::<S, _, M>(self.tree, self.records, self.rays, self.active, self.found)
+        tile::occluded::<S, _, M, _>(self.tree, self.records, self.rays, self.active, self.found, &mut ())
     }
 }
 
@@ -436,7 +436,7 @@ struct CountTile<'a> {
     tree: &'a KdTree,
     rays: &'a [RayPacket<16>],
     active: &'a [u32; PACKETS],
-    hits: &'a mut [HitPacket<16>],
+    any_hit: bool,
     counts: &'a mut TileCounts,
 }
 
@@ -445,7 +445,13 @@ impl Task for CountTile<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { tree, rays, active, hits, counts } = self;
-        tile::intersect::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
+        let Self { tree, rays, active, any_hit, counts } = self;
+        if any_hit {
+            let found = &mut [0; PACKETS][..rays.len()];
+            tile::occluded::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, found, counts)
+        } else {
+            let hits = &mut [const { HitPacket::miss() }; PACKETS][..rays.len()];
+            tile::intersect::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
+        }
     }
 }

@@ -49,7 +49,7 @@ fn beams(mesh: &Mesh, rays: &[Ray]) -> u64 {
     let mut counts = TileCounts::default();
     for rays in rays.chunks_exact(256) {
         let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
-        accel.count_tile(&packets, &[0xffff; 16], &mut counts);
+        accel.count_tile(&packets, &[0xffff; 16], false, &mut counts);
     }
     counts.beams
 }

@@ -102,6 +102,9 @@ impl<const W: usize, L: Lanes<W>> Candidate<W, L> {
 pub trait Mode {
     /// Its name.
     const ACCURACY: Accuracy;
+    /// Whether its test says of every ray that passes the edges by more than the error bounds of
+    /// [`Test::place`] on which side it does.
+    const SURE: bool;
     /// What is kept of each triangle.
     type Record: Send + Sync;
     /// The test for `W` rays in lanes `L`.
@@ -122,18 +125,21 @@ pub struct Exact;
 
 impl Mode for Fast {
     const ACCURACY: Accuracy = Accuracy::Fast;
+    const SURE: bool = false;
     type Record = super::fast::Projected;
     type Test<const W: usize, L: Lanes<W>> = super::fast::Lines<W, L>;
 }
 
 impl Mode for Watertight {
     const ACCURACY: Accuracy = Accuracy::Watertight;
+    const SURE: bool = true;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::watertight::Shear<W, L>;
 }
 
 impl Mode for Exact {
     const ACCURACY: Accuracy = Accuracy::Exact;
+    const SURE: bool = true;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
 }

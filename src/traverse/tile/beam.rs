@@ -1,18 +1,27 @@
-//! A tile's rays as one object: a beam of sixteen packets that part from one point.
+//! A tile's rays as one object: a beam of sixteen packets.
+//!
+//! The rays of a beam have a point in common, the *apex*: they part from it (camera rays), or run toward
+//! it (shadow rays to a point light); or they are parallel (shadow rays to the sun) and the apex is any
+//! point. Toward the apex they are looked at from its end, so that they too part from it.
 //!
 //! **Frame.** The axis along which the beam's first ray runs fastest becomes z (renamed cyclically, and
-//! turned so that rays run up along it); all rays must run fastest along it. A ray is `(a z, b z, z)`
-//! there, with the *slopes* `a` and `b`, of less than 1;
-//! `z` is the *depth*, `t` times the speed along that axis. Depth takes the place of `t` in the walk: it
-//! means the same for all rays of the beam, whatever their directions' lengths.
+//! turned so that rays leave the apex up along it); all rays must run fastest along it. `z` is the
+//! *depth*, and takes the place of `t` in the walk: it means the same for all rays of the beam, whatever
+//! their origins and their directions' lengths. Two numbers tell a ray from the others, its *place* in
+//! the window that the beam looks through:
+//!
+//! ```text
+//! from an apex      (a z, b z, z)          place (a, b): the slopes, of less than 1
+//! PARALLEL          (x + a z, y + b z, z)  place (x, y): where it crosses z = 0; slopes are the beam's
+//! ```
 //!
 //! **Lanes.** One vector holds a number for each of the sixteen packets:
 //!
 //! ```text
 //!                 tile of 16 x 16 rays           a packet: 4 x 4 rays, one lane
 //!                 +----+----+----+----+
-//!                 |  0 |  1 |  4 |  5 |          low[0] [4]   least slope a of packet 4's rays
-//!                 +----+----+----+----+          high[1][4]   greatest slope b
+//!                 |  0 |  1 |  4 |  5 |          low[0] [4]   least place along x of packet 4's rays
+//!                 +----+----+----+----+          high[1][4]   greatest place along y
 //!                 |  2 |  3 |  6 |  7 |          tmin   [4]   from this depth on, and
 //!                 +----+----+----+----+          tmax   [4]   up to this one, some ray of packet 4
 //!                 |  8 |  9 | 12 | 13 |                       may be in the cell
@@ -21,79 +30,46 @@
 //!                 +----+----+----+----+           as the squares of a picture are, do best)
 //! ```
 //!
-//! **Crossing a plane.** All rays part from the apex, so the cell that the apex is in comes first for
-//! all of them, whichever way they run: there is no order to decide. A ray comes to a plane `s` away at
-//! the depth `s / slope`; a lane's rays do between `s` times the least and `s` times the greatest *rate*
-//! `1 / slope` of those that run toward it (never, if none does: the rate is infinite; and the greatest
-//! is infinite too if some do not). Rates are rounded outward.
+//! **Crossing a plane.** Of the two cells beside a plane, all rays of a beam come to the same one first:
+//! to that which holds the apex, or, if they are parallel, to that from which they run. From an apex, a
+//! ray comes to a plane `s` away at the depth `s / slope`; a lane's rays do between `s` times the least
+//! and `s` times the greatest *rate* `1 / slope` of those that run toward it (never, if none does: the
+//! rate is infinite; and the greatest is infinite too if some do not). Rates are rounded outward.
 //!
 //! Walls are as thick as in the packet's walk, for the same reason (see `walk`): the near cell is left
 //! behind the wall, the far one entered before it, and an apex inside the wall is in both.
 
 use crate::geometry::Aabb;
-use crate::simd::{Lanes, Mask};
-use crate::traverse::lanes::RayPacket;
-use crate::traverse::range::{LEAST, LIMIT};
+use crate::simd::Lanes;
 use crate::traverse::walk::{Interval, MARGIN};
 
 /// Packets in a beam.
 pub const PACKETS: usize = 16;
 
 /// What rates and depths are widened by, outward: more than the few roundings that are in them.
-const WIDEN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
-const NARROW: f32 = 1.0 - 1.0 / (1 << 20) as f32;
+pub const WIDEN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+pub const NARROW: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
-/// `1 / slope` of a lane's rays that run one way along an axis: the least, and the greatest.
+/// The least slope of parallel rays that is not lifted: over the whole scene, less than walls are thick.
+const FLATTEST: f32 = 1.0 / (1u64 << 40) as f32;
+
+/// Where a beam is, and how its frame lies.
 #[derive(Clone, Copy)]
-struct Rate<L> {
-    least: L,
-    greatest: L,
-}
-
-/// The rays of up to sixteen packets that share their origin.
-pub struct Beam<L> {
-    /// Where all rays part from.
+pub struct Frame {
+    /// The apex.
     pub apex: [f32; 3],
     /// Which coordinates are x, y and z in the frame.
     pub axes: [usize; 3],
     /// 1 or -1: what turns the z coordinate so that rays run up.
     pub sign: f32,
-    /// Half the thickness of walls.
-    thickness: f32,
-    /// Rates up and down along each of the scene's axes.
-    rates: [[Rate<L>; 2]; 3],
-    /// Least and greatest slopes `a` and `b` of each packet.
-    pub low: [L; 2],
-    pub high: [L; 2],
+    /// The slopes of parallel rays.
+    pub slopes: [f32; 2],
 }
 
-/// Where the lanes come to a plane.
-pub struct Crossing<L> {
-    /// Which child the apex is in: 0 below the plane, 1 above.
-    pub near: usize,
-    /// No ray is in the near child beyond this depth.
-    pub leave: L,
-    /// No ray is in the far child before this depth.
-    pub enter: L,
-}
-
-impl<L: Lanes<16>> Beam<L> {
-    /// Makes a beam of packets of which the lanes in `active` count, and finds the depths at which they
-    /// are inside of `bounds`. `None` if they are none: if origins differ, directions point too far
-    /// apart, or a ray is not an ordinary one or reaches behind its origin.
+impl Frame {
+    /// The frame for rays that leave `apex` about as `direction` does.
     #[inline(always)]
-    pub fn new(
-        rays: &[RayPacket<16>],
-        active: &[u32; PACKETS],
-        bounds: &Aabb,
-    ) -> Option<(Self, Interval<L>)> {
-        let zero = L::splat(0.0);
-        let first = active.iter().position(|&lanes| lanes != 0)?;
-        let lane = active[first].trailing_zeros() as usize;
-        let apex = [0, 1, 2].map(|axis| rays[first].origin[axis][lane]);
-        let direction = [0, 1, 2].map(|axis| rays[first].direction[axis][lane]);
-
-        // Choose the frame.
+    pub fn new(apex: [f32; 3], direction: [f32; 3]) -> Self {
         let speed = direction.map(f32::abs);
         let axis = if speed[1] <= speed[0] && speed[2] <= speed[0] {
             0
@@ -104,70 +80,80 @@ impl<L: Lanes<16>> Beam<L> {
         };
         let axes = [(axis + 1) % 3, (axis + 2) % 3, axis];
         let sign = if direction[axis] < 0.0 { -1.0 } else { 1.0 };
-
-        // Find each packet's slopes and depths, and whether it belongs to the beam at all.
-        let (mut low, mut high) = ([[0.0; 16]; 2], [[0.0; 16]; 2]);
-        let (mut nearest, mut farthest) = ([0.0; 16], [f32::NEG_INFINITY; 16]);
-        let infinite = L::splat(f32::INFINITY);
-        for (packet, rays) in rays.iter().enumerate() {
-            let lanes = active[packet];
-            if lanes == 0 {
-                continue;
-            }
-            let counts = L::mask_from_bits(lanes);
-            let forward = L::load(&rays.direction[axis]) * L::splat(sign);
-            let tnear = L::load(&rays.tnear);
-            let tfar = L::load(&rays.tfar);
-            // A NaN anywhere fails these. The speed forward is the direction's greatest component.
-            let ordinary = L::splat(LEAST).le(forward) & forward.lt(L::splat(LIMIT));
-            let mut belongs = ordinary & zero.le(tnear) & tfar.le(infinite);
-            for (axis, &coordinate) in apex.iter().enumerate() {
-                belongs = belongs & L::load(&rays.origin[axis]).eq(L::splat(coordinate));
-            }
-            for side in 0..2 {
-                let slope = L::load(&rays.direction[axes[side]]) / forward;
-                belongs = belongs & slope.abs().lt(L::splat(1.0));
-                low[side][packet] = L::select(counts, slope, infinite).least();
-                high[side][packet] = L::select(counts, slope, zero - infinite).greatest();
-            }
-            if belongs.bits() & lanes != lanes {
-                return None;
-            }
-            nearest[packet] = L::select(counts, tnear * forward, infinite).least();
-            farthest[packet] = L::select(counts, tfar * forward, zero - infinite).greatest();
-        }
-
-        let (low, high) = ([L::load(&low[0]), L::load(&low[1])], [L::load(&high[0]), L::load(&high[1])]);
-        let mut beam = Self {
-            apex,
-            axes,
-            sign,
-            thickness: 0.0,
-            rates: [[Rate { least: zero, greatest: zero }; 2]; 3],
-            low,
-            high,
-        };
-        beam.thickness = MARGIN * beam.reach(bounds);
-        beam.rates[axes[0]] = rates(low[0], high[0]);
-        beam.rates[axes[1]] = rates(low[1], high[1]);
-        let toward = Rate { least: L::splat(NARROW), greatest: L::splat(WIDEN) };
-        let away = Rate { least: infinite, greatest: infinite };
-        beam.rates[axis] = if sign > 0.0 { [toward, away] } else { [away, toward] };
-
-        let interval = Interval {
-            tmin: L::load(&nearest) * L::splat(NARROW),
-            tmax: L::load(&farthest) * L::splat(WIDEN),
-        };
-        let interval = beam.clip(interval, bounds);
-        Some((beam, interval))
+        let along = direction[axis] * sign;
+        Self { apex, axes, sign, slopes: [direction[axes[0]] / along, direction[axes[1]] / along] }
     }
+}
 
-    /// The greatest coordinate distance from the apex to the bounds.
-    fn reach(&self, bounds: &Aabb) -> f32 {
-        (0..3).fold(0.0, |reach: f32, axis| {
-            let apex = self.apex[axis];
+/// What a lane's rays have between them: places in a rectangle, depths in an interval.
+#[derive(Clone, Copy)]
+pub struct Extent<L> {
+    pub low: [L; 2],
+    pub high: [L; 2],
+    pub depths: Interval<L>,
+}
+
+/// How far a beam's rays are from what they would be in exact arithmetic, and from one another.
+#[derive(Clone, Copy, Default)]
+pub struct Spread {
+    /// The greatest coordinate distance from the apex to a ray's origin.
+    pub range: f32,
+    /// How far from the apex rays may pass that should run through it.
+    pub stray: f32,
+}
+
+/// `1 / slope` of a lane's rays that run one way along an axis: the least, and the greatest.
+#[derive(Clone, Copy)]
+struct Rate<L> {
+    least: L,
+    greatest: L,
+}
+
+/// The rays of up to sixteen packets.
+pub struct Beam<L, const PARALLEL: bool> {
+    pub frame: Frame,
+    pub spread: Spread,
+    /// Least and greatest places of each packet.
+    pub low: [L; 2],
+    pub high: [L; 2],
+    /// Half the thickness of walls.
+    thickness: f32,
+    /// Rates up and down along each of the scene's axes, of rays from an apex.
+    rates: [[Rate<L>; 2]; 3],
+}
+
+/// Where the lanes come to a plane.
+pub struct Crossing<L> {
+    /// Which child comes first: 0 below the plane, 1 above.
+    pub near: usize,
+    /// No ray is in the near child beyond this depth.
+    pub leave: L,
+    /// No ray is in the far child before this depth.
+    pub enter: L,
+}
+
+impl<L: Lanes<16>, const PARALLEL: bool> Beam<L, PARALLEL> {
+    /// A beam in a scene, and the depths at which its packets are inside of the scene's bounds.
+    #[inline(always)]
+    pub fn new(frame: Frame, extent: &Extent<L>, spread: Spread, bounds: &Aabb) -> (Self, Interval<L>) {
+        let (zero, infinite) = (L::splat(0.0), L::splat(f32::INFINITY));
+        let Extent { low, high, depths } = *extent;
+        let reach = (0..3).fold(0.0, |reach: f32, axis| {
+            let apex = frame.apex[axis];
             reach.max((bounds.min[axis] - apex).abs()).max((bounds.max[axis] - apex).abs())
-        })
+        });
+        let thickness = MARGIN * (reach + spread.range) + spread.stray;
+        let mut rates = [[Rate { least: zero, greatest: zero }; 2]; 3];
+        if !PARALLEL {
+            rates[frame.axes[0]] = rates_of(low[0], high[0]);
+            rates[frame.axes[1]] = rates_of(low[1], high[1]);
+            let toward = Rate { least: L::splat(NARROW), greatest: L::splat(WIDEN) };
+            let away = Rate { least: infinite, greatest: infinite };
+            rates[frame.axes[2]] = if frame.sign > 0.0 { [toward, away] } else { [away, toward] };
+        }
+        let beam = Self { frame, spread, low, high, thickness, rates };
+        let interval = beam.clip(depths, bounds);
+        (beam, interval)
     }
 
     /// What is left of depths inside of the bounds, walls included.
@@ -176,21 +162,14 @@ impl<L: Lanes<16>> Beam<L> {
         let Interval { mut tmin, mut tmax } = interval;
         tmax = L::splat(f32::MAX).min(tmax);
         for axis in 0..3 {
-            let [up, down] = &self.rates[axis];
-            let below = bounds.min[axis] - self.apex[axis];
-            let above = bounds.max[axis] - self.apex[axis];
-            if below > self.thickness {
-                tmin = tmin.max(L::splat(below - self.thickness) * up.least);
-            }
-            if -above > self.thickness {
-                tmin = tmin.max(L::splat(-above - self.thickness) * down.least);
-            }
-            // A lane all of whose rays run one way leaves there.
-            if above + self.thickness > 0.0 {
-                tmax = tmax.min(L::splat(above + self.thickness) * up.greatest);
-            }
-            if self.thickness - below > 0.0 {
-                tmax = tmax.min(L::splat(self.thickness - below) * down.greatest);
+            // The bounds are above the one plane, and below the other.
+            for (plane, inside) in [(bounds.min[axis], 1), (bounds.max[axis], 0)] {
+                let crossing = self.crossing(axis, plane);
+                if crossing.near == inside {
+                    tmax = crossing.leave.min(tmax);
+                } else {
+                    tmin = crossing.enter.max(tmin);
+                }
             }
         }
         Interval { tmin, tmax }
@@ -199,12 +178,18 @@ impl<L: Lanes<16>> Beam<L> {
     /// Where the lanes come to a plane.
     #[inline(always)]
     pub fn crossing(&self, axis: usize, position: f32) -> Crossing<L> {
-        let way = position - self.apex[axis];
+        if PARALLEL { self.crossing_along(axis, position) } else { self.crossing_from(axis, position) }
+    }
+
+    /// Rays from the apex.
+    #[inline(always)]
+    fn crossing_from(&self, axis: usize, position: f32) -> Crossing<L> {
+        let way = position - self.frame.apex[axis];
         let near = usize::from(way < 0.0);
         let way = way.abs();
         if way <= self.thickness {
             // The apex is in the wall: every ray may be in either child, at any depth.
-            return Crossing { near, leave: L::splat(f32::MAX), enter: L::splat(0.0) };
+            return Crossing { near, leave: L::splat(f32::MAX), enter: L::splat(f32::NEG_INFINITY) };
         }
         let rate = &self.rates[axis][near];
         Crossing {
@@ -213,11 +198,44 @@ impl<L: Lanes<16>> Beam<L> {
             enter: L::splat(way - self.thickness) * rate.least,
         }
     }
+
+    /// Parallel rays.
+    #[inline(always)]
+    fn crossing_along(&self, axis: usize, position: f32) -> Crossing<L> {
+        let Frame { apex, axes, sign, slopes } = &self.frame;
+        let way = position - apex[axis];
+        if axis == axes[2] {
+            let way = way * sign;
+            let near = usize::from(*sign < 0.0);
+            return Crossing {
+                near,
+                leave: L::splat(way + self.thickness),
+                enter: L::splat(way - self.thickness),
+            };
+        }
+        // Turned so that rays run up, if they run at all.
+        let side = usize::from(axis == axes[1]);
+        let rate = L::splat(1.0 / slopes[side].abs().max(FLATTEST));
+        let (above, below) = (L::splat(way + self.thickness), L::splat(way - self.thickness));
+        if slopes[side] < 0.0 {
+            Crossing {
+                near: 1,
+                leave: (self.high[side] - below) * rate,
+                enter: (self.low[side] - above) * rate,
+            }
+        } else {
+            Crossing {
+                near: 0,
+                leave: (above - self.low[side]) * rate,
+                enter: (below - self.high[side]) * rate,
+            }
+        }
+    }
 }
 
 /// The rates up and down of lanes with slopes from `low` to `high`.
 #[inline(always)]
-fn rates<L: Lanes<16>>(low: L, high: L) -> [Rate<L>; 2] {
+fn rates_of<L: Lanes<16>>(low: L, high: L) -> [Rate<L>; 2] {
     let (zero, infinite) = (L::splat(0.0), L::splat(f32::INFINITY));
     let (at_low, at_high) = (L::splat(1.0) / low, L::splat(1.0) / high);
     let (all_up, some_up) = (zero.lt(low), zero.lt(high));

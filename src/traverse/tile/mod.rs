@@ -5,46 +5,46 @@
 //! *intervals* that hold what all of its rays do (multi-level ray tracing: Reshetov, Soupikov & Hurley
 //! 2005; interval traversal: Boulos, Wald & Benthin 2008). In order:
 //!
-//! 1. `beam`: the rays are made a beam; that decides whether they are alike enough at all.
-//! 2. `walk` (here): the beam descends the *upper tree*, whose leaves are pages of some fifty
-//!    triangles, near cells first.
+//! 1. `form`: the rays are made a beam (`beam`); that decides whether they are alike enough at all.
+//!    They are if they part from one point, run toward one, or are parallel.
+//! 2. `page`: the beam descends the *upper tree*, whose leaves are pages of some fifty triangles, near
+//!    cells first.
 //! 3. `outline`: of a page's triangles, sixteen at a time, those that no ray can hit are culled: first
 //!    for the whole beam, then for single packets.
-//! 4. `leaf`: what is left is tested by the mode's own test, sixteen rays against one triangle, as the
-//!    packet kernel does, and so with the same answers to the bit.
+//! 4. `nearest`: what is left is tested by the mode's own test, sixteen rays against one triangle, as
+//!    the packet kernel does, and so with the same answers to the bit. `shadow`, for any hit: only where
+//!    an error bound leaves doubt.
 //! 5. Where no more than [`FEW`] packets of the beam are left at a node, each goes on alone as a
 //!    packet through the full tree below; and so does every packet, from the start, of a tile that has
 //!    taken so much work that its rays cannot be alike.
 
 mod beam;
-mod leaf;
+mod bundle;
+mod form;
+mod nearest;
 mod outline;
+mod page;
 mod probe;
+mod shadow;
 
 pub use beam::PACKETS;
 pub use probe::{Probe, TileCounts};
 
 use super::lanes::{HitPacket, RayPacket};
-use super::stack::Stack;
-use super::walk::Interval;
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Mask, Simd};
-use beam::Beam;
-use leaf::{Tile, WORK};
+use crate::simd::{Lanes, Simd};
+use beam::{Beam, Extent, Frame, Spread};
+use form::{Form, Seen};
+use nearest::Nearest;
+use page::Descent;
+use shadow::Shadows;
 
 /// So many packets, or fewer, go on alone.
 const FEW: u32 = 1;
 
-/// A subtree that waits for its turn, with the packets' depths in it.
-#[derive(Clone, Copy)]
-struct Waiting<L> {
-    place: usize,
-    interval: Interval<L>,
-}
-
 /// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
-/// `false`, and nothing done, if the rays are no beam.
+/// `false`, and nothing done, if the rays are no beam from one point.
 #[inline(always)]
 pub fn intersect<S: Simd, T: Tree, M: Mode, P: Probe>(
     tree: &T,
@@ -54,143 +54,114 @@ pub fn intersect<S: Simd, T: Tree, M: Mode, P: Probe>(
     hits: &mut [HitPacket<16>],
     probe: &mut P,
 ) -> bool {
-    let Some((beam, interval)) = beam::<S::F16, T>(tree, rays, active) else { return false };
     if S::NATIVE == 16 {
-        let mut tile = Tile::<_, S::F16, T, M, 16, false>::new(tree, records, rays, active, &beam);
-        walk(&mut tile, interval, probe);
-        for (packet, hits) in hits.iter_mut().enumerate() {
-            tile.give(packet, hits);
-        }
+        nearest::<S::F16, S::F16, T, M, P, 16>(tree, records, rays, active, hits, probe)
     } else {
-        let mut tile = Tile::<_, S::F8, T, M, 8, false>::new(tree, records, rays, active, &beam);
-        walk(&mut tile, interval, probe);
-        for (packet, hits) in hits.iter_mut().enumerate() {
-            tile.give(packet, hits);
-        }
+        nearest::<S::F16, S::F8, T, M, P, 8>(tree, records, rays, active, hits, probe)
     }
-    true
 }
 
 /// The lanes in `active` that hit anything, packet by packet. `false`, and nothing done, if the rays
 /// are no beam.
 #[inline(always)]
-pub fn occluded<S: Simd, T: Tree, M: Mode>(
+pub fn occluded<S: Simd, T: Tree, M: Mode, P: Probe>(
     tree: &T,
     records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     found: &mut [u32],
+    probe: &mut P,
 ) -> bool {
-    let Some((beam, interval)) = beam::<S::F16, T>(tree, rays, active) else { return false };
     if S::NATIVE == 16 {
-        let mut tile = Tile::<_, S::F16, T, M, 16, true>::new(tree, records, rays, active, &beam);
-        walk(&mut tile, interval, &mut ());
-        for (packet, found) in found.iter_mut().enumerate() {
-            *found = tile.found(packet);
-        }
+        shadows::<S::F16, S::F16, T, M, P, 16>(tree, records, rays, active, found, probe)
     } else {
-        let mut tile = Tile::<_, S::F8, T, M, 8, true>::new(tree, records, rays, active, &beam);
-        walk(&mut tile, interval, &mut ());
-        for (packet, found) in found.iter_mut().enumerate() {
-            *found = tile.found(packet);
-        }
+        shadows::<S::F16, S::F8, T, M, P, 8>(tree, records, rays, active, found, probe)
+    }
+}
+
+/// [`intersect`] with `N` rays to a register.
+#[inline(always)]
+fn nearest<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+    hits: &mut [HitPacket<16>],
+    probe: &mut P,
+) -> bool {
+    if !tree.scale().is_none() {
+        return false;
+    }
+    let Some((Form::From, frame)) = form::guess(rays, active) else { return false };
+    let Some(extent) = form::from_apex::<L>(&frame, rays, active) else { return false };
+    let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
+    let mut bundle = Nearest::<L, R, T, M, N>::new(tree, records, rays, active, &beam);
+    Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
+    for (packet, hits) in hits.iter_mut().enumerate() {
+        bundle.give(packet, hits);
     }
     true
 }
 
-/// The beam of rays that are alike enough, and its depths inside of the tree's bounds.
+/// [`occluded`] with `N` rays to a register.
 #[inline(always)]
-fn beam<L: Lanes<16>, T: Tree>(
+fn shadows<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize>(
     tree: &T,
+    records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
-) -> Option<(Beam<L>, Interval<L>)> {
-    if tree.scale().is_none() { Beam::new(rays, active, tree.bounds()) } else { None }
+    found: &mut [u32],
+    probe: &mut P,
+) -> bool {
+    if !tree.scale().is_none() {
+        return false;
+    }
+    let Some((form, frame)) = form::guess(rays, active) else { return false };
+    let mut seen = Seen::new();
+    let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, active, &mut seen) else {
+        return false;
+    };
+    let trace = Trace { tree, records, rays, active, frame, extent, spread };
+    let open = if form == Form::Along {
+        trace.shadows::<R, M, P, N, true>(&mut seen, probe)
+    } else {
+        trace.shadows::<R, M, P, N, false>(&mut seen, probe)
+    };
+    for ((found, open), active) in found.iter_mut().zip(open).zip(active) {
+        *found = active & !open;
+    }
+    true
 }
 
-/// Walks the upper tree with all packets of a tile.
-#[inline(always)]
-fn walk<L, R, T, M, P, const N: usize, const ANY: bool>(
-    tile: &mut Tile<'_, L, R, T, M, N, ANY>,
-    mut interval: Interval<L>,
-    probe: &mut P,
-) where
-    L: Lanes<16>,
-    R: Lanes<N>,
-    T: Tree,
-    M: Mode,
-    P: Probe,
-{
-    let (tree, beam) = (tile.tree, tile.beam);
-    let mut live = interval.live().bits();
-    if live == 0 {
-        return;
-    }
-    let start = interval;
-    let mut place = 0;
-    let mut node = tree.upper(place);
-    let mut stack = Stack::new();
-    loop {
-        // Descend to a page, leaving far children on the stack.
-        let mut nodes = 0;
-        loop {
-            nodes += 1;
-            probe.node(live.count_ones());
-            if node.is_leaf() {
-                tile.visit(tree.page(node), &interval, live, probe);
-                break;
-            }
-            if live.count_ones() <= FEW {
-                probe.alone(live.count_ones());
-                let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
-                while live != 0 {
-                    let packet = live.trailing_zeros() as usize & 15;
-                    live &= live - 1;
-                    tile.go_alone(packet, place, tmin[packet], tmax[packet]);
-                }
-                break;
-            }
-            let crossing = beam.crossing(node.axis(), node.split());
-            let near = Interval { tmin: interval.tmin, tmax: crossing.leave.min(interval.tmax) };
-            let far = Interval { tmin: crossing.enter.max(interval.tmin), tmax: interval.tmax };
-            let (in_near, in_far) = (near.live().bits(), far.live().bits());
-            let below = node.below() as usize;
-            let (near_place, far_place) = (below + crossing.near, below + (1 - crossing.near));
-            if in_far == 0 {
-                // Whoever was live still is: the near cell holds all that is left.
-                place = near_place;
-            } else if in_near == 0 {
-                place = far_place;
-            } else {
-                stack.push(Waiting { place: far_place, interval: far });
-                (place, interval, live) = (near_place, near, in_near);
-            }
-            node = tree.upper(place);
-        }
+/// Rays that are known to be a beam.
+struct Trace<'a, L, T, K> {
+    tree: &'a T,
+    records: &'a [K],
+    rays: &'a [RayPacket<16>],
+    active: &'a [u32; PACKETS],
+    frame: Frame,
+    extent: Extent<L>,
+    spread: Spread,
+}
 
-        // Where it does not pay, each packet goes on alone from the start, with what was found as its bound.
-        tile.work += nodes;
-        if tile.work > WORK {
-            let (tmin, tmax) = (start.tmin.store(), L::load(&tile.reach).min(start.tmax).store());
-            let packets = start.live().bits();
-            probe.alone(packets.count_ones());
-            for packet in (0..PACKETS).filter(|packet| packets >> packet & 1 == 1) {
-                tile.go_alone(packet, 0, tmin[packet], tmax[packet]);
-            }
-            return;
-        }
-
-        // Take up the next subtree that some packet can still find something nearer in.
-        loop {
-            let Some(next) = stack.pop() else { return };
-            let tmax = L::load(&tile.reach).min(next.interval.tmax);
-            interval = Interval { tmin: next.interval.tmin, tmax };
-            live = interval.live().bits();
-            if live != 0 {
-                place = next.place;
-                break;
-            }
-        }
-        node = tree.upper(place);
+impl<L: Lanes<16>, T: Tree, K> Trace<'_, L, T, K> {
+    /// The lanes that find nothing.
+    #[inline(always)]
+    fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(
+        &self,
+        seen: &mut Seen,
+        probe: &mut P,
+    ) -> [u32; PACKETS]
+    where
+        R: Lanes<N>,
+        M: Mode<Record = K>,
+        P: Probe,
+    {
+        let Self { tree, records, rays, active, frame, ref extent, spread } = *self;
+        let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
+        let mut bundle =
+            Shadows::<L, R, T, M, N, PARALLEL>::new(tree, records, rays, active, seen, &interval);
+        Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
+        bundle.open
     }
 }

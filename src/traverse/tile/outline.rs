@@ -3,7 +3,7 @@
 //! The question is asked three times, each time of sixteen pairs at once, by the same code:
 //! sixteen triangles against the whole beam, then the triangles that are left one by one against
 //! sixteen packets, or the packets one by one against sixteen triangles. A [`Window`] is what a packet
-//! (or the beam) sees: slopes `a` and `b` in a rectangle, depths in an interval. An [`Outline`] is what
+//! (or the beam) sees: places `a` and `b` in a rectangle, depths in an interval. An [`Outline`] is what
 //! is seen of a triangle:
 //!
 //! - **Edges.** With corners `p`, `q` relative to the apex, a ray `(a, b, 1)` passes the edge on the
@@ -17,18 +17,35 @@
 //!   eye to the horizon is where it is, not where its corners are: it is tested in the cell in which it
 //!   is hit, and not at all behind what hides it.
 //!
+//! Parallel rays see corners where they would cross `z = 0` with them, at depth 1 as it were; and meet a
+//! plane at the depth `(d - n . (a, b, 0)) / (n . slopes)`.
+//!
 //! **Nothing is lost.** Every test of [`crate::geometry::triangle`] answers for corners moved by no
 //! more than some 16 roundings of `far`, the greatest coordinate of the triangle relative to the apex.
 //! Outlines are widened by [`SLACK`], 128 roundings of it, which covers that and the roundings of what
 //! is computed here. What is left goes through the mode's own test: culling decides about time, never
 //! about a hit.
 
-use super::beam::Beam;
+use super::beam::{Beam, Frame, Spread};
 use crate::geometry::triangle::Triangle;
 use crate::simd::Lanes;
 
 /// By how much outlines are widened, relative to the farthest corner.
 const SLACK: f32 = 128.0 / (1 << 24) as f32;
+
+impl Spread {
+    /// By how much outlines are widened whatever their distance.
+    #[inline(always)]
+    fn slack(&self) -> f32 {
+        self.range * SLACK + self.stray * 4.0
+    }
+
+    /// What places in a window may be off by: a few roundings of slopes, or of coordinates.
+    #[inline(always)]
+    pub fn blur<const PARALLEL: bool>(&self) -> f32 {
+        if PARALLEL { self.range * 1e-6 + TINY } else { 1e-6 }
+    }
+}
 
 /// Keeps the slack above what underflows.
 const TINY: f32 = 1e-36;
@@ -36,7 +53,7 @@ const TINY: f32 = 1e-36;
 /// What sixteen packets see of the scene, or one (in every lane).
 #[derive(Clone, Copy)]
 pub struct Window<L> {
-    /// Least and greatest slopes.
+    /// Least and greatest places.
     pub low: [L; 2],
     pub high: [L; 2],
     /// Their middle, and half their width.
@@ -48,23 +65,24 @@ pub struct Window<L> {
 }
 
 impl<L: Lanes<16>> Window<L> {
-    /// The window of slopes from `low` to `high`.
+    /// The window of places from `low` to `high`, which are off by less than `blur`.
     #[inline(always)]
-    pub fn new(low: [L; 2], high: [L; 2], nearest: L, farthest: L) -> Self {
+    pub fn new(low: [L; 2], high: [L; 2], nearest: L, farthest: L, blur: f32) -> Self {
         let half = L::splat(0.5);
         let center = [(low[0] + high[0]) * half, (low[1] + high[1]) * half];
-        // Half the width and a few roundings of the slopes themselves.
-        let more = L::splat(1e-6);
+        let more = L::splat(blur);
         let half = [(high[0] - low[0]) * half + more, (high[1] - low[1]) * half + more];
         Self { low, high, center, half, nearest, farthest }
     }
 }
 
 /// What is seen of sixteen triangles, or of one (in every lane).
-pub struct Outline<L> {
+pub struct Outline<L, const PARALLEL: bool> {
     /// For each edge `p x q`, and its slack.
     edges: [[L; 4]; 3],
-    /// The plane's normal, its distance from the apex (not negative), and that one's slack.
+    /// The plane: the last is the slack of its distance from the apex. From an apex, the normal, and the
+    /// distance, which is not negative; parallel, the distance as a function of the place, and how fast
+    /// rays come nearer, which is not negative.
     plane: [L; 5],
     /// Slopes and depths, slack included.
     low: [L; 2],
@@ -73,7 +91,7 @@ pub struct Outline<L> {
     far: L,
 }
 
-impl<L: Lanes<16>> Outline<L> {
+impl<L: Lanes<16>, const PARALLEL: bool> Outline<L, PARALLEL> {
     /// The pairs of triangle and window in which a ray may hit.
     #[inline(always)]
     pub fn meets(&self, window: &Window<L>) -> L::Mask {
@@ -89,13 +107,19 @@ impl<L: Lanes<16>> Outline<L> {
             least = least.min(center + width);
             greatest = greatest.max(center - width);
         }
-        // How fast rays come nearer to the plane.
-        let [x, y, z, distance, slack] = self.plane;
+        // From an apex: how fast rays come nearer to the plane. Parallel: how far away it is.
+        let [x, y, z, other, slack] = self.plane;
         let center = x.mul_add(a, y.mul_add(b, z));
         let width = x.abs().mul_add(half_a, y.abs() * half_b);
+        let in_time = if PARALLEL {
+            (center - width - slack).le(window.farthest * other)
+                & (window.nearest * other).le(center + width + slack)
+        } else {
+            (other - slack).le(window.farthest * (center + width))
+                & (window.nearest * (center - width)).le(other + slack)
+        };
         (zero.le(least) | greatest.le(zero))
-            & (distance - slack).le(window.farthest * (center + width))
-            & (window.nearest * (center - width)).le(distance + slack)
+            & in_time
             & self.near.le(window.farthest)
             & window.nearest.le(self.far)
             & self.low[0].le(window.high[0])
@@ -155,67 +179,83 @@ impl Block {
 
     /// Works out all lanes' outlines, which it keeps, and gives them.
     #[inline(always)]
-    pub fn outline<L: Lanes<16>>(&mut self, beam: &Beam<L>) -> Outline<L> {
+    pub fn outline<L: Lanes<16>, const PARALLEL: bool>(
+        &mut self,
+        beam: &Beam<L, PARALLEL>,
+    ) -> Outline<L, PARALLEL> {
         let zero = L::splat(0.0);
-        let apex = [0, 1, 2].map(|i| beam.apex[beam.axes[i]]);
+        let Frame { axes, sign, slopes, .. } = &beam.frame;
+        let apex = [0, 1, 2].map(|i| beam.frame.apex[axes[i]]);
         let mut points = [[zero; 3]; 3];
         let mut original = [[zero; 3]; 3];
+        let along = [L::splat(slopes[0]), L::splat(slopes[1])];
         let mut far = zero;
         for corner in 0..3 {
             for axis in 0..3 {
-                let place = L::load(&self.corners[corner][beam.axes[axis]]);
+                let place = L::load(&self.corners[corner][axes[axis]]);
                 original[corner][axis] = place;
                 let offset = place - L::splat(apex[axis]);
                 far = far.max(offset.abs());
-                points[corner][axis] = if axis == 2 { offset * L::splat(beam.sign) } else { offset };
+                points[corner][axis] = if axis == 2 { offset * L::splat(*sign) } else { offset };
             }
         }
-        let slack = far * L::splat(SLACK) + L::splat(TINY);
+        let slack = far * L::splat(SLACK) + L::splat(beam.spread.slack() + TINY);
+        let (z0, z1, z2) = (points[0][2], points[1][2], points[2][2]);
+        let (near, back) = (z0.min(z1).min(z2), z0.max(z1).max(z2));
+        let normal = [
+            L::load(&self.normal[axes[0]]),
+            L::load(&self.normal[axes[1]]),
+            L::load(&self.normal[axes[2]]) * L::splat(*sign),
+        ];
+        let plane = plane::<L, PARALLEL>(&normal, &points[0], &along, slack);
 
         // Each edge with the apex spans a plane. From p x (q - p) instead of p x q: an edge is known to
         // a rounding of its own length, not of its distance.
+        let one = L::splat(1.0);
         let mut edges = [[zero; 4]; 3];
         for i in 0..3 {
-            let (p, from, to) = (&points[i], &original[i], &original[(i + 1) % 3]);
-            let e = [to[0] - from[0], to[1] - from[1], (to[2] - from[2]) * L::splat(beam.sign)];
+            let (mut p, from, to) = (points[i], &original[i], &original[(i + 1) % 3]);
+            let mut e = [to[0] - from[0], to[1] - from[1], (to[2] - from[2]) * L::splat(*sign)];
+            if PARALLEL {
+                p = [p[0] - along[0] * p[2], p[1] - along[1] * p[2], one];
+                e = [e[0] - along[0] * e[2], e[1] - along[1] * e[2], zero];
+            }
             let size = e[0].abs() + e[1].abs() + e[2].abs();
+            let off = if PARALLEL { slack + slack } else { slack };
             edges[i] = [
                 p[1] * e[2] - p[2] * e[1],
                 p[2] * e[0] - p[0] * e[2],
                 p[0] * e[1] - p[1] * e[0],
-                slack * (size + slack) + L::splat(TINY),
+                off * (size + off) + L::splat(TINY),
             ];
+            if PARALLEL {
+                points[i] = p;
+            }
         }
 
-        // The box that the corners span, if all are in front.
-        let [z0, z1, z2] = [points[0][2], points[1][2], points[2][2]];
-        let (near, back) = (z0.min(z1).min(z2), z0.max(z1).max(z2));
-        let in_front = (slack + slack).lt(near);
-        let one = L::splat(1.0);
-        let rates = [one / z0, one / z1, one / z2];
-        let widen = (slack + slack) * rates[0].max(rates[1]).max(rates[2]);
+        // The box that the corners span; from an apex, if all are in front.
         let infinite = L::splat(f32::INFINITY);
         let (mut low, mut high) = ([zero; 2], [zero; 2]);
-        for side in 0..2 {
-            let slopes = [points[0][side] * rates[0], points[1][side] * rates[1], points[2][side] * rates[2]];
-            let least = slopes[0].min(slopes[1]).min(slopes[2]) - widen;
-            let greatest = slopes[0].max(slopes[1]).max(slopes[2]) + widen;
-            low[side] = L::select(in_front, least, zero - infinite);
-            high[side] = L::select(in_front, greatest, infinite);
+        if PARALLEL {
+            let widen = slack + slack;
+            for side in 0..2 {
+                let places = [points[0][side], points[1][side], points[2][side]];
+                low[side] = places[0].min(places[1]).min(places[2]) - widen;
+                high[side] = places[0].max(places[1]).max(places[2]) + widen;
+            }
+        } else {
+            let in_front = (slack + slack).lt(near);
+            let rates = [one / z0, one / z1, one / z2];
+            let widen = (slack + slack) * rates[0].max(rates[1]).max(rates[2]);
+            for side in 0..2 {
+                let places =
+                    [points[0][side] * rates[0], points[1][side] * rates[1], points[2][side] * rates[2]];
+                let least = places[0].min(places[1]).min(places[2]) - widen;
+                let greatest = places[0].max(places[1]).max(places[2]) + widen;
+                low[side] = L::select(in_front, least, zero - infinite);
+                high[side] = L::select(in_front, greatest, infinite);
+            }
         }
-
-        // The plane, turned so that the apex is behind it. Too near, it may be on either side; so it is
-        // for a triangle without area, whose normal is zero.
-        let n = [
-            L::load(&self.normal[beam.axes[0]]),
-            L::load(&self.normal[beam.axes[1]]),
-            L::load(&self.normal[beam.axes[2]]) * L::splat(beam.sign),
-        ];
-        let distance = n[0] * points[0][0] + n[1] * points[0][1] + n[2] * points[0][2];
-        let sure = slack.lt(distance.abs());
-        let turned = L::splat(1.0).copysign(distance);
-        let turned = L::select(sure, turned, zero);
-        let plane = [n[0] * turned, n[1] * turned, n[2] * turned, distance * turned, slack];
 
         let outline = Outline { edges, plane, low, high, near: near - slack, far: back + slack };
         self.keep(&outline);
@@ -223,7 +263,7 @@ impl Block {
     }
 
     #[inline(always)]
-    fn keep<L: Lanes<16>>(&mut self, outline: &Outline<L>) {
+    fn keep<L: Lanes<16>, const PARALLEL: bool>(&mut self, outline: &Outline<L, PARALLEL>) {
         for i in 0..3 {
             for j in 0..4 {
                 self.edges[i][j] = outline.edges[i][j].store();
@@ -253,9 +293,16 @@ impl Block {
         edges
     }
 
+    /// The plane of one lane's triangle.
+    #[inline(always)]
+    pub fn plane_of(&self, lane: usize) -> [f32; 5] {
+        let lane = lane & 15;
+        [0, 1, 2, 3, 4].map(|i| self.plane[i][lane])
+    }
+
     /// The outline of one lane's triangle, in every lane.
     #[inline(always)]
-    pub fn one<L: Lanes<16>>(&self, lane: usize) -> Outline<L> {
+    pub fn one<L: Lanes<16>, const PARALLEL: bool>(&self, lane: usize) -> Outline<L, PARALLEL> {
         let lane = lane & 15;
         let zero = L::splat(0.0);
         let mut edges = [[zero; 4]; 3];
@@ -277,4 +324,20 @@ impl Block {
             far: L::splat(self.far[lane]),
         }
     }
+}
+
+/// What an outline keeps of planes through `point`.
+#[inline(always)]
+fn plane<L: Lanes<16>, const PARALLEL: bool>(n: &[L; 3], point: &[L; 3], along: &[L; 2], slack: L) -> [L; 5] {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let distance = n[0] * point[0] + n[1] * point[1] + n[2] * point[2];
+    if PARALLEL {
+        let speed = n[0] * along[0] + n[1] * along[1] + n[2];
+        let turned = one.copysign(speed);
+        return [(zero - n[0]) * turned, (zero - n[1]) * turned, distance * turned, speed * turned, slack];
+    }
+    // Turned so that the apex is behind it. Too near, it may be on either side; so it is for a triangle
+    // without area, whose normal is zero.
+    let turned = L::select(slack.lt(distance.abs()), one.copysign(distance), zero);
+    [n[0] * turned, n[1] * turned, n[2] * turned, distance * turned, slack]
 }

@@ -1,0 +1,58 @@
+//! What the walk of a beam asks of the rays in it; and rays cut into what registers hold.
+
+use super::outline::Block;
+use crate::simd::Lanes;
+use crate::traverse::lanes::RayPacket;
+
+/// A beam's rays, and what they have found.
+pub trait Bundle<L: Lanes<16>> {
+    /// The depth beyond which no ray of each packet looks for anything any more.
+    fn reach(&self) -> L;
+
+    /// Prepares a triangle of a block for being tested: the one in `lane`, whose id is `primitive`.
+    fn place(&mut self, lane: usize, primitive: u32, block: &Block);
+
+    /// Tests a packet against the triangles whose bits are set in `chosen`, of a block with the ids
+    /// `primitives`, all of which have been placed.
+    fn test(&mut self, packet: usize, primitives: &[u32], chosen: u32);
+
+    /// A packet walks on by itself, through the full tree below a place of the upper one, from the depth
+    /// `tmin` to `tmax`.
+    fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32);
+}
+
+/// What depths are widened by where they become parameters of rays, relative to themselves.
+pub const ROUNDINGS: f32 = 1.0 / (1 << 20) as f32;
+
+/// A part of a packet's row.
+#[inline(always)]
+pub fn part_of<const N: usize, V>(row: &[V; 16], part: usize) -> &[V; N] {
+    &row.as_chunks::<N>().0[part]
+}
+
+#[inline(always)]
+pub fn part_mut<const N: usize, V>(row: &mut [V; 16], part: usize) -> &mut [V; N] {
+    &mut row.as_chunks_mut::<N>().0[part]
+}
+
+#[inline(always)]
+pub fn load_part<const N: usize, R: Lanes<N>>(row: &[f32; 16], part: usize) -> R {
+    R::load(part_of(row, part))
+}
+
+#[inline(always)]
+pub fn load_part3<const N: usize, R: Lanes<N>>(rows: &[[f32; 16]; 3], part: usize) -> [R; 3] {
+    [load_part(&rows[0], part), load_part(&rows[1], part), load_part(&rows[2], part)]
+}
+
+/// A part of a packet as a packet.
+#[inline(always)]
+pub fn part_packet<const N: usize>(all: &RayPacket<16>, part: usize) -> RayPacket<N> {
+    let row = |row| *part_of(row, part);
+    RayPacket {
+        origin: [row(&all.origin[0]), row(&all.origin[1]), row(&all.origin[2])],
+        direction: [row(&all.direction[0]), row(&all.direction[1]), row(&all.direction[2])],
+        tnear: row(&all.tnear),
+        tfar: row(&all.tfar),
+    }
+}

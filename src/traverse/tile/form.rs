@@ -1,0 +1,267 @@
+//! Whether rays are a beam, and which: what each ray and each packet look like from the apex.
+
+use super::beam::{Extent, Frame, NARROW, PACKETS, Spread, WIDEN};
+use crate::simd::{Lanes, Mask};
+use crate::traverse::lanes::RayPacket;
+use crate::traverse::range::{LEAST, LIMIT};
+use crate::traverse::walk::Interval;
+
+/// What rays of a beam have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// They part from the apex.
+    From,
+    /// They run toward the apex, and no farther.
+    Toward,
+    /// They are parallel.
+    Along,
+}
+
+/// Rays toward an apex may pass it by as much, relative to the distance, and to the apex's coordinates:
+/// their directions are rounded, and the apex is.
+const STRAY: f32 = 1.0 / (1 << 20) as f32;
+const STRAY_OF_PLACE: f32 = 1.0 / (1 << 22) as f32;
+
+/// The least squared sine of an angle between two rays that tells where they meet.
+const NARROWEST: f64 = 1e-12;
+
+/// What the first two coordinates of rays are in the beam's window, and their depths.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub struct Seen {
+    /// Each packet's rays' places.
+    pub place: [[[f32; 16]; 2]; PACKETS],
+    /// The depth at which `t` is 0.
+    pub start: [[f32; 16]; PACKETS],
+    /// By how much the depth grows with `t`: less than 0 for rays toward the apex.
+    pub speed: [[f32; 16]; PACKETS],
+    /// The depths between which each ray looks for hits.
+    pub near: [[f32; 16]; PACKETS],
+    pub far: [[f32; 16]; PACKETS],
+}
+
+impl Seen {
+    pub const fn new() -> Self {
+        const ROWS: [[f32; 16]; PACKETS] = [[0.0; 16]; PACKETS];
+        Self { place: [[[0.0; 16]; 2]; PACKETS], start: ROWS, speed: ROWS, near: ROWS, far: ROWS }
+    }
+}
+
+/// The first lane that counts of a packet.
+#[inline(always)]
+fn first_lane(active: &[u32; PACKETS], packet: usize) -> Option<usize> {
+    (active[packet] != 0).then(|| active[packet].trailing_zeros() as usize & 15)
+}
+
+#[inline(always)]
+fn origin<const W: usize>(rays: &RayPacket<W>, lane: usize) -> [f32; 3] {
+    [rays.origin[0][lane], rays.origin[1][lane], rays.origin[2][lane]]
+}
+
+#[inline(always)]
+fn direction<const W: usize>(rays: &RayPacket<W>, lane: usize) -> [f32; 3] {
+    [rays.direction[0][lane], rays.direction[1][lane], rays.direction[2][lane]]
+}
+
+/// The form that rays have if they have any, and its frame.
+#[inline(always)]
+pub fn guess(rays: &[RayPacket<16>], active: &[u32; PACKETS]) -> Option<(Form, Frame)> {
+    let first = (0..rays.len()).find(|&packet| active[packet] != 0)?;
+    let last = (0..rays.len()).rfind(|&packet| active[packet] != 0)?;
+    let (lane, other) = (first_lane(active, first)?, 31 - (active[last] & 0xffff).leading_zeros() as usize);
+    let (o, d) = (origin(&rays[first], lane), direction(&rays[first], lane));
+    if o == origin(&rays[last], other) {
+        return Some((Form::From, Frame::new(o, d)));
+    }
+    if d == direction(&rays[last], other) {
+        return Some((Form::Along, Frame::new(o, d)));
+    }
+    Some((Form::Toward, Frame::new(meeting(rays, active, first)?, d.map(|x| -x))))
+}
+
+/// Where rays meet, if they do: where the first comes nearest to that one of all packets' first rays
+/// that parts from it most. In double precision: of a narrow beam, rays meet far away.
+#[inline(always)]
+fn meeting(rays: &[RayPacket<16>], active: &[u32; PACKETS], first: usize) -> Option<[f32; 3]> {
+    let double = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
+    let lane = first_lane(active, first)?;
+    let (o, d) = (double(origin(&rays[first], lane)), double(direction(&rays[first], lane)));
+    let (mut widest, mut found) = (NARROWEST, None);
+    for packet in first + 1..rays.len() {
+        let Some(lane) = first_lane(active, packet) else { continue };
+        let (p, e) = (double(origin(&rays[packet], lane)), double(direction(&rays[packet], lane)));
+        let (dd, de, ee) = (d.dot(d), d.dot(e), e.dot(e));
+        let determinant = dd * ee - de * de;
+        if determinant > widest * dd * ee {
+            widest = determinant / (dd * ee);
+            let way = p - o;
+            let t = (ee * way.dot(d) - de * way.dot(e)) / determinant;
+            found = (t > 0.0).then(|| (o + d * t).as_vec3().to_array());
+        }
+    }
+    found
+}
+
+/// The packets' extents if the rays are a beam from its apex. `None` if they are none: if origins differ,
+/// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin.
+#[inline(always)]
+pub fn from_apex<L: Lanes<16>>(
+    frame: &Frame,
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+) -> Option<Extent<L>> {
+    let mut extents = Extents::new();
+    for (packet, rays) in rays.iter().enumerate() {
+        let lanes = active[packet];
+        if lanes == 0 {
+            continue;
+        }
+        let axis = frame.axes[2];
+        let forward = L::load(&rays.direction[axis]) * L::splat(frame.sign);
+        let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
+        let mut belongs = ordinary(forward, tnear, tfar);
+        for axis in 0..3 {
+            belongs = belongs & L::load(&rays.origin[axis]).eq(L::splat(frame.apex[axis]));
+        }
+        let slopes = [
+            L::load(&rays.direction[frame.axes[0]]) / forward,
+            L::load(&rays.direction[frame.axes[1]]) / forward,
+        ];
+        belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
+        if belongs.bits() & lanes != lanes {
+            return None;
+        }
+        extents.set(packet, lanes, slopes, tnear * forward, tfar * forward);
+    }
+    Some(extents.finish(0.0))
+}
+
+/// The packets' extents, what each ray looks like, and how far rays are off, if they are a beam of some
+/// form. `None` if they are none.
+#[inline(always)]
+pub fn of_form<L: Lanes<16>>(
+    form: Form,
+    frame: &Frame,
+    rays: &[RayPacket<16>],
+    active: &[u32; PACKETS],
+    seen: &mut Seen,
+) -> Option<(Extent<L>, Spread)> {
+    let zero = L::splat(0.0);
+    let sign = L::splat(frame.sign);
+    let along = [L::splat(frame.slopes[0]), L::splat(frame.slopes[1])];
+    let place = frame.apex.iter().fold(0.0f32, |place, x| place.max(x.abs()));
+    let mut extents = Extents::new();
+    let mut range = zero;
+    let mut first_direction = None;
+    for (packet, rays) in rays.iter().enumerate() {
+        let lanes = active[packet];
+        if lanes == 0 {
+            continue;
+        }
+        let [x, y, z] = frame.axes;
+        let d =
+            [L::load(&rays.direction[x]), L::load(&rays.direction[y]), L::load(&rays.direction[z]) * sign];
+        let o = [
+            L::load(&rays.origin[x]) - L::splat(frame.apex[x]),
+            L::load(&rays.origin[y]) - L::splat(frame.apex[y]),
+            (L::load(&rays.origin[z]) - L::splat(frame.apex[z])) * sign,
+        ];
+        let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
+        let forward = if form == Form::Toward { zero - d[2] } else { d[2] };
+        let mut belongs = ordinary(forward, tnear, tfar);
+        let slopes = if form == Form::Along { along } else { [d[0] / d[2], d[1] / d[2]] };
+        belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
+
+        let (start, end) = (o[2] + d[2] * tnear, o[2] + d[2] * tfar);
+        let crossing = [o[0] - slopes[0] * o[2], o[1] - slopes[1] * o[2]];
+        let (near, far) = if form == Form::Toward { (end, start) } else { (start, end) };
+        match form {
+            Form::From => {
+                belongs = belongs & o[0].eq(zero) & o[1].eq(zero) & o[2].eq(zero);
+            }
+            Form::Toward => {
+                let stray = o[2] * L::splat(STRAY) + L::splat(place * STRAY_OF_PLACE);
+                belongs = belongs & crossing[0].abs().le(stray) & crossing[1].abs().le(stray);
+                belongs = belongs & (zero - stray).le(near);
+            }
+            Form::Along => {
+                let lane = lanes.trailing_zeros() as usize & 15;
+                let first = *first_direction.get_or_insert_with(|| direction(rays, lane));
+                for axis in 0..3 {
+                    belongs = belongs & L::load(&rays.direction[axis]).eq(L::splat(first[axis]));
+                }
+            }
+        }
+        if belongs.bits() & lanes != lanes {
+            return None;
+        }
+        let counts = L::mask_from_bits(lanes);
+        range = range.max(L::select(counts, o[0].abs().max(o[1].abs()).max(o[2].abs()), zero));
+        let places = if form == Form::Along { crossing } else { slopes };
+        extents.set(packet, lanes, places, near, far);
+        seen.place[packet] = [places[0].store(), places[1].store()];
+        seen.start[packet] = o[2].store();
+        seen.speed[packet] = d[2].store();
+        seen.near[packet] = near.store();
+        seen.far[packet] = far.store();
+    }
+    let range = range.greatest();
+    let stray = if form == Form::Toward { range * STRAY + place * STRAY_OF_PLACE } else { 0.0 };
+    Some((extents.finish(range), Spread { range, stray }))
+}
+
+/// The lanes whose rays are ordinary: their speed forward, which is the direction's greatest component,
+/// is within what kernels compute with, and their interval begins at the origin or beyond. A NaN
+/// anywhere fails.
+#[inline(always)]
+fn ordinary<L: Lanes<16>>(forward: L, tnear: L, tfar: L) -> L::Mask {
+    L::splat(LEAST).le(forward)
+        & forward.lt(L::splat(LIMIT))
+        & L::splat(0.0).le(tnear)
+        & tfar.le(L::splat(f32::INFINITY))
+}
+
+/// Packets' extents in the making.
+struct Extents {
+    low: [[f32; 16]; 2],
+    high: [[f32; 16]; 2],
+    nearest: [f32; 16],
+    farthest: [f32; 16],
+}
+
+impl Extents {
+    /// Extents of no ray.
+    #[inline(always)]
+    const fn new() -> Self {
+        const NONE: [f32; 16] = [f32::INFINITY; 16];
+        const NEVER: [f32; 16] = [f32::NEG_INFINITY; 16];
+        Self { low: [NONE; 2], high: [NEVER; 2], nearest: NONE, farthest: NEVER }
+    }
+
+    #[inline(always)]
+    fn set<L: Lanes<16>>(&mut self, packet: usize, lanes: u32, places: [L; 2], near: L, far: L) {
+        let (counts, most) = (L::mask_from_bits(lanes), L::splat(f32::INFINITY));
+        let least = L::splat(f32::NEG_INFINITY);
+        for side in 0..2 {
+            self.low[side][packet] = L::select(counts, places[side], most).least();
+            self.high[side][packet] = L::select(counts, places[side], least).greatest();
+        }
+        self.nearest[packet] = L::select(counts, near, most).least();
+        self.farthest[packet] = L::select(counts, far, least).greatest();
+    }
+
+    /// The extents of rays whose origins are up to `range` away from the apex.
+    #[inline(always)]
+    fn finish<L: Lanes<16>>(&self, range: f32) -> Extent<L> {
+        let (nearest, farthest) = (L::load(&self.nearest), L::load(&self.farthest));
+        // Outward by more than the roundings of depths, which are sums, and may have either sign.
+        let more = L::splat(range * (WIDEN - 1.0));
+        let tmin = (nearest * L::splat(NARROW)).min(nearest * L::splat(WIDEN)) - more;
+        let tmax = (farthest * L::splat(WIDEN)).max(farthest * L::splat(NARROW)) + more;
+        Extent {
+            low: [L::load(&self.low[0]), L::load(&self.low[1])],
+            high: [L::load(&self.high[0]), L::load(&self.high[1])],
+            depths: Interval { tmin, tmax },
+        }
+    }
+}

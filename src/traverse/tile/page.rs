@@ -1,0 +1,243 @@
+//! The walk of the upper tree, and a page's triangles against a beam: culled, then handed on to be
+//! tested.
+
+use super::FEW;
+use super::beam::{Beam, PACKETS};
+use super::bundle::Bundle;
+use super::outline::{Block, Window};
+use super::probe::Probe;
+use crate::kdtree::Tree;
+use crate::simd::{Lanes, Mask};
+use crate::traverse::stack::Stack;
+use crate::traverse::walk::Interval;
+
+/// The work after which a tile is given up: some five times what a tile takes whose rays are worth
+/// tracing together. Rays that are not, because each packet's go all over the place, or because there are
+/// many triangles between one ray and the next, would meet every triangle in a packet's window.
+const WORK: u32 = 4096;
+
+/// The work of a block, of culling a triangle for packets, and of a packet's test, in steps of about one
+/// upper node.
+const BLOCK_WORK: u32 = 12;
+const CULL_WORK: u32 = 3;
+const TEST_WORK: u32 = 4;
+
+/// A subtree that waits for its turn, with the packets' depths in it.
+#[derive(Clone, Copy)]
+struct Waiting<L> {
+    place: usize,
+    interval: Interval<L>,
+}
+
+/// A bundle of rays on its way down the upper tree.
+pub struct Descent<'a, L, T, const PARALLEL: bool> {
+    tree: &'a T,
+    beam: &'a Beam<L, PARALLEL>,
+    /// What the packets see of the scene, depths apart.
+    window: Window<L>,
+    block: Block,
+    /// What was done so far.
+    work: u32,
+}
+
+impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> {
+    #[inline(always)]
+    pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>) -> Self {
+        let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
+        let window = Window::new(beam.low, beam.high, never, ever, beam.spread.blur::<PARALLEL>());
+        Self { tree, beam, window, block: Block::new(), work: 0 }
+    }
+
+    /// Walks the upper tree with all packets of a tile, in which they are in `interval`.
+    #[inline(always)]
+    pub fn walk<B: Bundle<L>, P: Probe>(mut self, bundle: &mut B, mut interval: Interval<L>, probe: &mut P) {
+        let (tree, beam) = (self.tree, self.beam);
+        let mut live = interval.live().bits();
+        if live == 0 {
+            return;
+        }
+        let start = interval;
+        let mut place = 0;
+        let mut node = tree.upper(place);
+        let mut stack = Stack::new();
+        loop {
+            // Descend to a page, leaving far children on the stack.
+            let mut nodes = 0;
+            loop {
+                nodes += 1;
+                probe.node(live.count_ones());
+                if node.is_leaf() {
+                    self.visit(bundle, tree.page(node), &interval, live, probe);
+                    break;
+                }
+                if live.count_ones() <= FEW {
+                    go_alone(bundle, &interval, live, place, probe);
+                    break;
+                }
+                let crossing = beam.crossing(node.axis(), node.split());
+                let near = Interval { tmin: interval.tmin, tmax: crossing.leave.min(interval.tmax) };
+                let far = Interval { tmin: crossing.enter.max(interval.tmin), tmax: interval.tmax };
+                let (in_near, in_far) = (near.live().bits(), far.live().bits());
+                let below = node.below() as usize;
+                let (near_place, far_place) = (below + crossing.near, below + (1 - crossing.near));
+                if in_far == 0 {
+                    // Whoever was live still is: the near cell holds all that is left.
+                    place = near_place;
+                } else if in_near == 0 {
+                    place = far_place;
+                } else {
+                    stack.push(Waiting { place: far_place, interval: far });
+                    (place, interval, live) = (near_place, near, in_near);
+                }
+                node = tree.upper(place);
+            }
+
+            // Where it does not pay, each packet goes on alone from the start, with what was found as its
+            // bound.
+            self.work += nodes;
+            if self.work > WORK {
+                let rest = Interval { tmin: start.tmin, tmax: bundle.reach().min(start.tmax) };
+                go_alone(bundle, &rest, start.live().bits(), 0, probe);
+                return;
+            }
+
+            // Take up the next subtree that some packet can still find something in.
+            loop {
+                let Some(next) = stack.pop() else { return };
+                let tmax = bundle.reach().min(next.interval.tmax);
+                interval = Interval { tmin: next.interval.tmin, tmax };
+                live = interval.live().bits();
+                if live != 0 {
+                    place = next.place;
+                    break;
+                }
+            }
+            node = tree.upper(place);
+        }
+    }
+
+    /// Looks for hits among a page's triangles, for the packets in `live` in their depths.
+    #[inline(always)]
+    fn visit<B: Bundle<L>, P: Probe>(
+        &mut self,
+        bundle: &mut B,
+        page: &[u32],
+        interval: &Interval<L>,
+        live: u32,
+        probe: &mut P,
+    ) {
+        if page.is_empty() {
+            return;
+        }
+        probe.page(live.count_ones());
+        let mut window = self.window;
+        (window.nearest, window.farthest) = (interval.tmin, interval.tmax);
+        let all = union(&window, L::mask_from_bits(live), self.beam.spread.blur::<PARALLEL>());
+        for primitives in page.chunks(16) {
+            if self.work > WORK {
+                return;
+            }
+            self.work += BLOCK_WORK;
+
+            // Cull for the beam.
+            for (lane, &primitive) in primitives.iter().enumerate() {
+                self.block.set(lane, self.tree.triangle(primitive));
+            }
+            let outline = self.block.outline(self.beam);
+            let present = (1 << primitives.len()) - 1;
+            let left = outline.meets(&all).bits() & present;
+            probe.block(primitives.len(), left.count_ones());
+            if left == 0 {
+                continue;
+            }
+            for triangle in bits(left) {
+                bundle.place(triangle, primitives[triangle], &self.block);
+            }
+
+            // Cull for packets, the rarer of packets and triangles one by one.
+            self.work += left.count_ones().min(live.count_ones()) * CULL_WORK;
+            let mut chosen = [0; PACKETS];
+            if left.count_ones() <= live.count_ones() {
+                for triangle in bits(left) {
+                    let outline = self.block.one::<L, PARALLEL>(triangle);
+                    for packet in bits(outline.meets(&window).bits() & live) {
+                        chosen[packet & 15] |= 1 << triangle;
+                    }
+                }
+            } else {
+                for packet in bits(live) {
+                    chosen[packet & 15] = outline.meets(&one(&window, packet)).bits() & left;
+                }
+            }
+
+            // Test what is left.
+            for packet in bits(live) {
+                let chosen = chosen[packet & 15];
+                if chosen != 0 {
+                    self.work += chosen.count_ones() * TEST_WORK;
+                    probe.tests(chosen.count_ones());
+                    bundle.test(packet, primitives, chosen);
+                }
+            }
+            window.farthest = bundle.reach().min(window.farthest);
+        }
+    }
+}
+
+/// Packets go on alone below a place of the upper tree.
+#[inline(always)]
+fn go_alone<L: Lanes<16>, B: Bundle<L>, P: Probe>(
+    bundle: &mut B,
+    interval: &Interval<L>,
+    packets: u32,
+    place: usize,
+    probe: &mut P,
+) {
+    probe.alone(packets.count_ones());
+    let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
+    for packet in bits(packets) {
+        bundle.go_alone(packet & 15, place, tmin[packet & 15], tmax[packet & 15]);
+    }
+}
+
+/// What some of a window's packets see together.
+#[inline(always)]
+fn union<L: Lanes<16>>(window: &Window<L>, packets: L::Mask, blur: f32) -> Window<L> {
+    let (low, high) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
+    Window::new(
+        [
+            L::splat(L::select(packets, window.low[0], low).least()),
+            L::splat(L::select(packets, window.low[1], low).least()),
+        ],
+        [
+            L::splat(L::select(packets, window.high[0], high).greatest()),
+            L::splat(L::select(packets, window.high[1], high).greatest()),
+        ],
+        L::splat(L::select(packets, window.nearest, low).least()),
+        L::splat(L::select(packets, window.farthest, high).greatest()),
+        blur,
+    )
+}
+
+/// What one packet sees.
+#[inline(always)]
+fn one<L: Lanes<16>>(window: &Window<L>, packet: usize) -> Window<L> {
+    Window {
+        low: [window.low[0].lane(packet), window.low[1].lane(packet)],
+        high: [window.high[0].lane(packet), window.high[1].lane(packet)],
+        center: [window.center[0].lane(packet), window.center[1].lane(packet)],
+        half: [window.half[0].lane(packet), window.half[1].lane(packet)],
+        nearest: window.nearest.lane(packet),
+        farthest: window.farthest.lane(packet),
+    }
+}
+
+/// The places of the bits that are set.
+#[inline(always)]
+pub fn bits(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = (set != 0).then(|| set.trailing_zeros() as usize)?;
+        set &= set - 1;
+        Some(place)
+    })
+}

@@ -1,0 +1,242 @@
+//! Rays of a beam that ask for any hit.
+//!
+//! Their answer is one bit. So a triangle that some ray passes through by more than an error bound, at
+//! a depth that is within the ray's interval by more than that, is enough, whatever the mode's own test
+//! would compute; and one that it misses by more is none. Only rays in doubt are put to that test, from
+//! their own origins: those that graze an edge, and those that leave or meet the triangle.
+
+use super::beam::PACKETS;
+use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut, part_packet};
+use super::form::Seen;
+use super::outline::Block;
+use super::page::bits;
+use crate::geometry::triangle::{Mode, Test};
+use crate::kdtree::Tree;
+use crate::simd::{Lanes, Mask};
+use crate::traverse::closest::Closest;
+use crate::traverse::lanes::RayPacket;
+use crate::traverse::packet::descend;
+use crate::traverse::walk::{Interval, Walk};
+
+/// A triangle as the beam sees it, in the form of an outline.
+#[derive(Clone, Copy, Default)]
+struct Placed {
+    edges: [[f32; 3]; 3],
+    slack: f32,
+    plane: [f32; 5],
+}
+
+/// Up to sixteen packets. Rays stand in the lanes of `R`, as many as a register holds.
+pub struct Shadows<'a, L, R, T, M, const N: usize, const PARALLEL: bool>
+where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+{
+    tree: &'a T,
+    records: &'a [M::Record],
+    rays: &'a [RayPacket<16>],
+    seen: &'a Seen,
+    /// The lanes of each packet that have found nothing yet.
+    pub open: [u32; PACKETS],
+    /// The depth beyond which no ray of a packet looks for anything any more.
+    reach: [f32; PACKETS],
+    placed: [Placed; 16],
+    widths: std::marker::PhantomData<(L, R)>,
+}
+
+impl<'a, L, R, T, M, const N: usize, const PARALLEL: bool> Shadows<'a, L, R, T, M, N, PARALLEL>
+where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+{
+    /// The rays at their start, in `interval`, beyond which nothing is.
+    #[inline(always)]
+    pub fn new(
+        tree: &'a T,
+        records: &'a [M::Record],
+        rays: &'a [RayPacket<16>],
+        active: &[u32; PACKETS],
+        seen: &'a mut Seen,
+        interval: &Interval<L>,
+    ) -> Self {
+        let reach = interval.tmax.store();
+        for packet in 0..rays.len().min(PACKETS) {
+            // A depth is multiplied by what may be off by a rounding of 1: it must be no farther than the
+            // scene is.
+            for part in 0..16 / N {
+                let far = load_part::<N, R>(&seen.far[packet], part).min(R::splat(reach[packet]));
+                *part_mut(&mut seen.far[packet], part) = far.store();
+            }
+        }
+        Self {
+            tree,
+            records,
+            rays,
+            seen,
+            open: *active,
+            reach,
+            placed: [Placed::default(); 16],
+            widths: std::marker::PhantomData,
+        }
+    }
+
+    /// The mode's own test, of the lanes in `doubtful`.
+    #[inline(always)]
+    fn decide(&self, packet: usize, part: usize, primitive: u32, doubtful: R::Mask) -> R::Mask {
+        let rays = &self.rays[packet];
+        let test = M::Test::<N, R>::new(
+            &load_part3::<N, R>(&rays.origin, part),
+            &load_part3::<N, R>(&rays.direction, part),
+            doubtful.bits(),
+        );
+        let candidate = test.test(&self.records[primitive as usize], doubtful);
+        // As a packet's closest hit is taken, which is none beyond the greatest float.
+        let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
+        let tnear = load_part::<N, R>(&rays.tnear, part);
+        candidate.inside & doubtful & tnear.le(candidate.t) & candidate.t.le(tfar)
+    }
+
+    /// Takes note of a part's lanes that found something.
+    #[inline(always)]
+    fn close(&mut self, packet: usize, part: usize, found: u32) {
+        self.open[packet] &= !(found << (part * N));
+        if self.open[packet] == 0 {
+            self.reach[packet] = f32::NEG_INFINITY;
+        }
+    }
+
+    /// The lanes of a part that have found nothing yet.
+    #[inline(always)]
+    fn open_in(&self, packet: usize, part: usize) -> u32 {
+        self.open[packet] >> (part * N) & ((1 << N) - 1)
+    }
+}
+
+impl<L, R, T, M, const N: usize, const PARALLEL: bool> Bundle<L> for Shadows<'_, L, R, T, M, N, PARALLEL>
+where
+    L: Lanes<16>,
+    R: Lanes<N>,
+    T: Tree,
+    M: Mode,
+{
+    #[inline(always)]
+    fn reach(&self) -> L {
+        L::load(&self.reach)
+    }
+
+    #[inline(always)]
+    fn place(&mut self, lane: usize, _primitive: u32, block: &Block) {
+        let edges = block.edges_of(lane);
+        self.placed[lane & 15] = Placed {
+            edges: edges.map(|[x, y, z, _]| [x, y, z]),
+            slack: edges[0][3].max(edges[1][3]).max(edges[2][3]),
+            plane: block.plane_of(lane),
+        };
+    }
+
+    #[inline(always)]
+    fn test(&mut self, packet: usize, primitives: &[u32], chosen: u32) {
+        let packet = packet & 15;
+        for part in 0..16 / N {
+            let lanes = self.open_in(packet, part);
+            if lanes == 0 {
+                continue;
+            }
+            let mut open = R::mask_from_bits(lanes);
+            let [a, b] = &self.seen.place[packet];
+            let (a, b) = (load_part::<N, R>(a, part), load_part::<N, R>(b, part));
+            let near = load_part::<N, R>(&self.seen.near[packet], part);
+            let far = load_part::<N, R>(&self.seen.far[packet], part);
+            for triangle in bits(chosen) {
+                let placed = &self.placed[triangle & 15];
+
+                // On which sides of the edges the rays pass.
+                let (mut least, mut greatest) = (R::splat(f32::INFINITY), R::splat(f32::NEG_INFINITY));
+                for [x, y, z] in &placed.edges {
+                    let edge = R::splat(*x).mul_add(a, R::splat(*y).mul_add(b, R::splat(*z)));
+                    least = least.min(edge);
+                    greatest = greatest.max(edge);
+                }
+                let (above, below) = (R::splat(placed.slack), R::splat(-placed.slack));
+                let maybe_inside = open & !(least.lt(below) & above.lt(greatest));
+                if !maybe_inside.any() {
+                    continue;
+                }
+
+                // Whether the plane lies between the rays' ends.
+                let [x, y, z, other, slack] = placed.plane;
+                let linear = R::splat(x).mul_add(a, R::splat(y).mul_add(b, R::splat(z)));
+                let (other, slack) = (R::splat(other), R::splat(slack));
+                let (at_near, at_far, plane) = if PARALLEL {
+                    (near * other, far * other, linear)
+                } else {
+                    (near * linear, far * linear, other)
+                };
+                let maybe = maybe_inside & !(at_far.lt(plane - slack)) & !((plane + slack).lt(at_near));
+                if !maybe.any() {
+                    continue;
+                }
+                let mut found = maybe & !maybe;
+                if M::SURE {
+                    let inside = above.lt(least) | greatest.lt(below);
+                    let between = (plane + slack).lt(at_far) & at_near.lt(plane - slack);
+                    found = maybe & inside & between;
+                }
+                let doubtful = maybe & !found;
+                if doubtful.any() {
+                    found = found | self.decide(packet, part, primitives[triangle], doubtful);
+                }
+                open = open & !found;
+                if !open.any() {
+                    break;
+                }
+            }
+            self.close(packet, part, lanes & !open.bits());
+        }
+    }
+
+    #[inline(always)]
+    fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
+        for part in 0..16 / N {
+            let lanes = self.open_in(packet, part);
+            if lanes == 0 {
+                continue;
+            }
+            let rays = part_packet::<N>(&self.rays[packet], part);
+            let (walk, inside) = Walk::<N, R>::new(&rays, lanes, self.tree.bounds());
+            let start = load_part::<N, R>(&self.seen.start[packet], part);
+            let speed = load_part::<N, R>(&self.seen.speed[packet], part);
+            let (one, other) = ((R::splat(tmin) - start) / speed, (R::splat(tmax) - start) / speed);
+            let more =
+                (start.abs() + R::splat(tmin.abs().max(tmax.abs()))) / speed.abs() * R::splat(ROUNDINGS);
+            let mut closest = Closest::new(R::load(&rays.tfar));
+            let interval = Interval {
+                tmin: (one.min(other) - more).max(inside.tmin),
+                tmax: (one.max(other) + more).min(inside.tmax),
+            };
+            if interval.live().any() {
+                let test = M::Test::<N, R>::new(
+                    &load_part3::<N, R>(&self.rays[packet].origin, part),
+                    &load_part3::<N, R>(&self.rays[packet].direction, part),
+                    lanes,
+                );
+                let (tnear, node) = (R::load(&rays.tnear), self.tree.beneath(place));
+                descend::<N, R, T, M, true>(
+                    self.tree,
+                    self.records,
+                    &walk,
+                    &test,
+                    tnear,
+                    node,
+                    interval,
+                    &mut closest,
+                );
+                self.close(packet, part, closest.found() & lanes);
+            }
+        }
+    }
+}
