@@ -5,7 +5,6 @@
 //! more than a handful of packets per worker. **The picture is the same, bit for bit, for every
 //! number of threads, tile size, packet width and instruction set.**
 
-mod choice;
 mod frame;
 pub mod image;
 mod offset;

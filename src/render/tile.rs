@@ -1,13 +1,12 @@
 //! Rendering one tile: its pixels in small blocks, a packet to each.
 
-use super::choice::Choice;
 use super::frame::TilePixels;
 use super::order::Tile;
 use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
 use crate::scene::View;
-use crate::traverse::{Accel, HitPacket, PacketWidth, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, PacketWidth, RayPacket};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -19,17 +18,14 @@ const SQUARE: u32 = 16;
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
 
-/// How a square's packets are traced.
+/// How a square's packets are traced. What was learnt from the squares before is there for those who can
+/// use it.
 pub(super) struct Calls<const W: usize> {
-    /// The closest hits of the lanes given with each packet: together, if there is a way, and packet by
-    /// packet.
-    together: Option<Intersect<W>>,
-    intersect: Intersect<W>,
+    /// The closest hits of the lanes given with each packet.
+    intersect: fn(&mut Dispatch, &Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
     /// Which of those lanes hit anything.
-    occluded: fn(&Accel, &[RayPacket<W>], &[u32], &mut [u32]),
+    occluded: fn(&mut Dispatch, &Accel, &[RayPacket<W>], &[u32], &mut [u32]),
 }
-
-type Intersect<const W: usize> = fn(&Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]);
 
 impl<const W: usize> Calls<W>
 where
@@ -37,13 +33,12 @@ where
 {
     /// Packet by packet.
     pub const PACKETS: Self = Self {
-        together: None,
-        intersect: |accel, rays, active, hits| {
+        intersect: |_, accel, rays, active, hits| {
             for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
                 *hits = accel.intersect_packet(rays, active);
             }
         },
-        occluded: |accel, rays, active, occluded| {
+        occluded: |_, accel, rays, active, occluded| {
             for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
                 *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
             }
@@ -52,9 +47,8 @@ where
 }
 
 impl Calls<16> {
-    /// All camera rays of a square together where that is quicker. (Shadow rays do not start at one
-    /// point.)
-    pub const TILES: Self = Self { together: Some(Accel::intersect_tile), ..Self::PACKETS };
+    /// All rays of a square together where that is quicker.
+    pub const TILES: Self = Self { intersect: Dispatch::intersect, occluded: Dispatch::occluded };
 }
 
 /// All that a tile's rendering reads.
@@ -89,7 +83,7 @@ pub(super) struct Scratch<const W: usize> {
     lit: Vec<u32>,
     shadows: Vec<RayPacket<W>>,
     occluded: Vec<u32>,
-    choice: Choice,
+    dispatch: Dispatch,
     pub camera: Tally,
     pub shadow: Tally,
 }
@@ -106,7 +100,7 @@ impl<const W: usize> Scratch<W> {
             lit: vec![0; count],
             shadows: vec![RayPacket::empty(); count],
             occluded: vec![0; count],
-            choice: Choice::default(),
+            dispatch: Dispatch::default(),
             camera: Tally::default(),
             shadow: Tally::default(),
         }
@@ -165,14 +159,10 @@ where
         let start = Instant::now();
         let active = &scratch.active[..used];
         self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
-        let tracing = Instant::now();
-        let way = if self.calls.together.is_some() { scratch.choice.next() } else { 1 };
-        let call = if way == 0 { self.calls.together } else { None }.unwrap_or(self.calls.intersect);
-        call(self.accel, &scratch.rays[..used], active, &mut scratch.hits[..used]);
-        let (now, rays) = (Instant::now(), count(active));
-        scratch.choice.record(way, rays, now - tracing);
-        scratch.camera.rays += rays;
-        scratch.camera.time += now - start;
+        let (rays, hits) = (&scratch.rays[..used], &mut scratch.hits[..used]);
+        (self.calls.intersect)(&mut scratch.dispatch, self.accel, rays, active, hits);
+        scratch.camera.rays += count(active);
+        scratch.camera.time += start.elapsed();
 
         for packet in 0..used {
             self.shade(scratch, packet, sample == 0, pixels);
@@ -180,7 +170,8 @@ where
 
         let start = Instant::now();
         let lit = &scratch.lit[..used];
-        (self.calls.occluded)(self.accel, &scratch.shadows[..used], lit, &mut scratch.occluded[..used]);
+        let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
+        (self.calls.occluded)(&mut scratch.dispatch, self.accel, rays, lit, occluded);
         for ((block, lit), occluded) in scratch.blocks.iter_mut().zip(lit).zip(&scratch.occluded) {
             for lane in lanes(lit & !occluded) {
                 block.sum[lane] += block.key[lane];

@@ -163,6 +163,27 @@ impl Accel {
         }
     }
 
+    /// [`intersect_packet`](Self::intersect_packet) in two packets of 8: quicker where rays part.
+    pub fn intersect_halves(&self, rays: &RayPacket<16>, active: u32) -> HitPacket<16> {
+        let mut hits = HitPacket::miss();
+        for half in 0..2 {
+            let active = active >> (half * 8) & lanes_of(8);
+            if active != 0 {
+                hits.set_part(half, &self.intersect_packet::<8>(&rays.part(half), active));
+            }
+        }
+        hits
+    }
+
+    /// [`occluded_packet`](Self::occluded_packet) in two packets of 8.
+    pub fn occluded_halves(&self, rays: &RayPacket<16>, active: u32) -> u32 {
+        (0..2)
+            .map(|half| (half, active >> (half * 8) & lanes_of(8)))
+            .filter(|&(_, active)| active != 0)
+            .map(|(half, active)| self.occluded_packet::<8>(&rays.part(half), active) << (half * 8))
+            .sum()
+    }
+
     /// The closest hits of up to sixteen packets that share their origin, as squares of a picture do; the
     /// lanes whose bit is not set in `active` come out as misses. What is too unlike to go together is
     /// traced packet by packet. Panics if there are more than sixteen packets, or not as many `active`

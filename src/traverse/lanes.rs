@@ -55,6 +55,18 @@ impl<const W: usize> RayPacket<W> {
             tfar: self.tfar[lane],
         }
     }
+
+    /// The `N` lanes from `part * N` on. Panics if there are not as many.
+    #[inline(always)]
+    pub(super) fn part<const N: usize>(&self, part: usize) -> RayPacket<N> {
+        let row = |row: &[f32; W]| row.as_chunks::<N>().0[part];
+        RayPacket {
+            origin: [row(&self.origin[0]), row(&self.origin[1]), row(&self.origin[2])],
+            direction: [row(&self.direction[0]), row(&self.direction[1]), row(&self.direction[2])],
+            tnear: row(&self.tnear),
+            tfar: row(&self.tfar),
+        }
+    }
 }
 
 /// `W` hits, component by component; a miss as in [`Hit::MISS`].
@@ -94,6 +106,18 @@ impl<const W: usize> HitPacket<W> {
             v: self.v[lane],
             primitive: self.primitive[lane],
             normal: Vec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]),
+        }
+    }
+
+    /// Puts `N` hits into the lanes from `part * N` on. Panics if there are not as many.
+    #[inline(always)]
+    pub(super) fn set_part<const N: usize>(&mut self, part: usize, hits: &HitPacket<N>) {
+        self.t.as_chunks_mut::<N>().0[part] = hits.t;
+        self.u.as_chunks_mut::<N>().0[part] = hits.u;
+        self.v.as_chunks_mut::<N>().0[part] = hits.v;
+        self.primitive.as_chunks_mut::<N>().0[part] = hits.primitive;
+        for axis in 0..3 {
+            self.normal[axis].as_chunks_mut::<N>().0[part] = hits.normal[axis];
         }
     }
 }

@@ -11,6 +11,7 @@
 
 mod accel;
 mod closest;
+mod dispatch;
 mod kernel;
 mod lanes;
 mod packet;
@@ -20,6 +21,7 @@ mod tile;
 mod walk;
 
 pub use accel::Accel;
+pub use dispatch::Dispatch;
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, PacketWidth, RayPacket};
 pub use tile::TileCounts;

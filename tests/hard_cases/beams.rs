@@ -5,10 +5,10 @@ use crate::meshes::{cube, floor, globe, joined, mapped, of_triangles, sphere, tw
 use crate::numbers::{Numbers, seeds};
 use crate::scene::Scene;
 use raypack::Vec3;
-use raypack::geometry::Ray;
+use raypack::geometry::{Hit, Ray};
 use raypack::kdtree::BuildParams;
 use raypack::mesh::Mesh;
-use raypack::traverse::{Accel, RayPacket, TileCounts};
+use raypack::traverse::{Accel, Kernel, RayPacket, TileCounts};
 
 /// Rays from a point, sorted by where they go: neighbours go nearly the same way.
 fn sorted(eye: Vec3, targets: impl IntoIterator<Item = Vec3>) -> Vec<Ray> {
@@ -43,13 +43,13 @@ fn picture(eye: Vec3, at: Vec3, size: u32, fov: f32) -> Vec<Ray> {
     (0..size * size).map(ray).collect()
 }
 
-/// How many lots of 256 rays are beams.
-fn beams(mesh: &Mesh, rays: &[Ray]) -> u64 {
+/// How many lots of 256 rays are beams, if they ask for their closest hits or for any.
+fn beams(mesh: &Mesh, rays: &[Ray], any_hit: bool) -> u64 {
     let accel = Accel::build(mesh, &BuildParams::default()).expect("builds");
     let mut counts = TileCounts::default();
     for rays in rays.chunks_exact(256) {
         let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
-        accel.count_tile(&packets, &[0xffff; 16], false, &mut counts);
+        accel.count_tile(&packets, &[0xffff; 16], any_hit, &mut counts);
     }
     counts.beams
 }
@@ -80,7 +80,7 @@ fn beams_at_the_seams_of_closed_surfaces_do_not_pass() {
                 })
                 .collect();
             let rays = sorted(eye, targets);
-            assert!(beams(&closed.mesh, &rays) > 0, "{}: hardly a beam", closed.name);
+            assert!(beams(&closed.mesh, &rays, false) > 0, "{}: hardly a beam", closed.name);
             scene.check_closed(&rays);
         }
     }
@@ -129,7 +129,7 @@ fn pictures_of_all_sorts_are_the_same_by_every_kernel() {
                 scene.trace(&rays);
             }
             let rays = picture(Vec3::new(0.25, 0.5, 3.0), Vec3::new(0.25, 0.5, 0.0), 32, 60.0);
-            assert_eq!(beams(&scene.mesh, &rays), 4, "{name}");
+            assert_eq!(beams(&scene.mesh, &rays, false), 4, "{name}");
         }
     }
 }
@@ -155,7 +155,77 @@ fn intervals_are_kept_by_beams_too() {
             }
         }
         scene.trace(&rays);
-        assert!(beams(&scene.mesh, &rays) > 0);
+        for any_hit in [false, true] {
+            assert!(beams(&scene.mesh, &rays, any_hit) > 0);
+        }
+    }
+}
+
+/// Where rays to a light start: on what a picture shows, on it to a rounding, or a little off it.
+fn surfaces(mesh: &Mesh, eye: Vec3, at: Vec3, numbers: &mut Numbers) -> Vec<Vec3> {
+    let rays = picture(eye, at, 32, 60.0);
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let accel = Accel::build(mesh, &BuildParams::default()).expect("builds");
+    accel.intersect_many(Kernel::Packet16, &rays, &mut hits);
+    let off = if numbers.below(2) == 0 { 0.0 } else { 1e-4 };
+    rays.iter()
+        .zip(&hits)
+        .filter(|(_, hit)| hit.is_hit())
+        .map(|(ray, hit)| ray.at(hit.t * (1.0 - off)))
+        .collect()
+}
+
+#[test]
+fn rays_to_a_light_go_together_and_see_the_same() {
+    let ball = sphere(3).mesh;
+    let hall = joined([&ball, &mapped(&ball, |p| p * 40.0), &mapped(&ball, |p| p * 0.2 + Vec3::Y * 2.0)]);
+    let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
+    let lattice = of_triangles((0..300).map(|i| {
+        let corner = Vec3::new((i % 10) as f32, (i / 10 % 5) as f32, (i / 50) as f32) - 2.5;
+        [corner, corner + Vec3::X * 0.9, corner + Vec3::new(0.1, 0.9, 0.0)]
+    }));
+    for (name, mesh, center, size) in [
+        ("a hall", hall, Vec3::ZERO, 1.0),
+        ("a lattice", lattice, Vec3::ZERO, 1.0),
+        ("far away", sphere(3).placed("far", 100.0, far).mesh, far, 100.0),
+        ("a small ring", mapped(&twisted_ring(48, 6, 1).mesh, |p| p * 1e-3), Vec3::ZERO, 1e-3),
+    ] {
+        let mut scene = Scene::new(name, 0, mesh);
+        let (mut meeting, mut parallel) = (0, 0);
+        for seed in seeds() {
+            scene.seed = seed;
+            let mut numbers = Numbers::new(seed, 45);
+            let eye = center + numbers.direction() * size * 3.0;
+            let points = surfaces(&scene.mesh, eye, center, &mut numbers);
+            let lights = [
+                eye + numbers.vector() * size,
+                center + numbers.vector() * size * 0.3,
+                center + numbers.direction() * size * 3000.0,
+                // In the very surface.
+                numbers.pick(&scene.mesh.positions),
+            ];
+            for light in lights {
+                let toward = |&point: &Vec3| Ray::segment(point, light - point, 0.0, 1.0);
+                let short = |&point: &Vec3| {
+                    let way = light - point;
+                    Ray::segment(point, way.normalize_or(Vec3::X), 0.0, way.length() * (1.0 - 1e-4))
+                };
+                let rays: Vec<Ray> = points.iter().map(toward).chain(points.iter().map(short)).collect();
+                scene.trace(&rays);
+                meeting += beams(&scene.mesh, &rays, true);
+            }
+            // Slanting, straight along an axis, and in a coordinate plane.
+            for way in [numbers.direction(), Vec3::Y, -Vec3::Z, Vec3::new(0.5, 0.0, 2.0)] {
+                let rays: Vec<Ray> = points
+                    .iter()
+                    .map(|&point| Ray::new(point, way))
+                    .chain(points.iter().map(|&point| Ray::segment(point, way, size * 0.01, size * 0.7)))
+                    .collect();
+                scene.trace(&rays);
+                parallel += beams(&scene.mesh, &rays, true);
+            }
+        }
+        assert!(meeting > 0 && parallel > 0, "{name}: {meeting} beams toward lights, {parallel} parallel");
     }
 }
 
@@ -177,7 +247,7 @@ fn beams_that_do_not_pay_are_given_up() {
         let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
         let mut counts = TileCounts::default();
         for packets in packets.chunks(16) {
-            accel.count_tile(packets, &[0xffff; 16], &mut counts);
+            accel.count_tile(packets, &[0xffff; 16], false, &mut counts);
         }
         if counts.beams > 0 {
             assert!(counts.tests < 2048 * counts.beams, "{counts:?}");

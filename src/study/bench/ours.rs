@@ -1,4 +1,4 @@
-//! raypack as an engine: a mode for every kernel.
+//! raypack as an engine: a mode for every kernel, and `auto`, which chooses among them as it goes.
 //!
 //! The single-ray kernel is given rays, the packet kernels packets, each made before the clock starts; the
 //! records go out in the kernel's own form.
@@ -9,7 +9,8 @@ use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::simd::Isa;
-use crate::traverse::{Accel, HitPacket, Kernel, PacketWidth, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// raypack with its tree built.
@@ -43,12 +44,73 @@ impl Ours {
         &self.accel
     }
 
-    fn packets<'a, const W: usize>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a>
+    /// A mode that traces packets of `W` one by one.
+    fn packets<'a, const W: usize>(
+        &'a self,
+        kernel: Kernel,
+        rays: &[Ray],
+        any_hit: bool,
+    ) -> Box<dyn Contender + 'a>
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        let lots = Lot::cut(rays, any_hit, HitPacket::miss(), |n| n.div_ceil(W), Packets::<W>::new);
-        Box::new(PacketRun { engine: self, lots })
+        let closest = |accel: &Accel, rays: &Packets<W>, hits: &mut [HitPacket<W>]| {
+            for ((packet, &lanes), out) in rays.packets.iter().zip(&rays.lanes).zip(hits) {
+                *out = accel.intersect_packet(packet, lanes);
+            }
+        };
+        let any = |accel: &Accel, rays: &Packets<W>, flags: &mut [u32]| {
+            for ((packet, &lanes), out) in rays.packets.iter().zip(&rays.lanes).zip(flags) {
+                *out = accel.occluded_packet(packet, lanes);
+            }
+        };
+        let lots = Packets::lots(rays, any_hit);
+        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
+    }
+
+    /// The mode that traces sixteen packets of 16 together, as far as they are alike.
+    fn tiles<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
+        let closest = |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
+            for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
+                accel.intersect_tile(packets, lanes, out);
+            }
+        };
+        let any = |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
+            for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
+                accel.occluded_tile(packets, lanes, out);
+            }
+        };
+        let lots = Packets::lots(rays, any_hit);
+        Box::new(PacketRun { engine: self, mode: Kernel::Tile.name(), lots, closest, any })
+    }
+
+    /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
+    /// chunk, and taken up by whoever comes next: mostly the same worker.
+    fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
+        let learnt = std::sync::Arc::new(Mutex::new(Vec::<Dispatch>::new()));
+        let take = |learnt: &Mutex<Vec<Dispatch>>| {
+            learnt.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+        };
+        let put = |learnt: &Mutex<Vec<Dispatch>>, dispatch| {
+            learnt.lock().unwrap_or_else(PoisonError::into_inner).push(dispatch);
+        };
+        let shared = learnt.clone();
+        let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
+            let mut dispatch = take(&shared);
+            for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
+                dispatch.intersect(accel, packets, lanes, out);
+            }
+            put(&shared, dispatch);
+        };
+        let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
+            let mut dispatch = take(&learnt);
+            for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
+                dispatch.occluded(accel, packets, lanes, out);
+            }
+            put(&learnt, dispatch);
+        };
+        let lots = Packets::lots(rays, any_hit);
+        Box::new(PacketRun { engine: self, mode: "auto", lots, closest, any })
     }
 }
 
@@ -78,17 +140,14 @@ impl Engine for Ours {
         let contender = |kernel| match kernel {
             Kernel::Single => {
                 let lots = Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec);
-                Box::new(SingleRun { engine: self, lots })
+                Box::new(SingleRun { engine: self, lots }) as Box<dyn Contender + 'a>
             }
-            Kernel::Packet4 => self.packets::<4>(rays, any_hit),
-            Kernel::Packet8 => self.packets::<8>(rays, any_hit),
-            Kernel::Packet16 => self.packets::<16>(rays, any_hit),
-            Kernel::Tile => {
-                let lots = Lot::cut(rays, any_hit, HitPacket::miss(), |n| n.div_ceil(16), Packets::new);
-                Box::new(TileRun { engine: self, lots })
-            }
+            Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
+            Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
+            Kernel::Packet16 => self.packets::<16>(kernel, rays, any_hit),
+            Kernel::Tile => self.tiles(rays, any_hit),
         };
-        Kernel::ALL.map(contender).into()
+        Kernel::ALL.into_iter().map(contender).chain([self.auto(rays, any_hit)]).collect()
     }
 }
 
@@ -143,10 +202,8 @@ impl<const W: usize> Packets<W> {
         }
     }
 
-    /// Each packet with a bit for each of its rays.
-    #[inline(always)]
-    fn with_lanes(&self) -> impl Iterator<Item = (&RayPacket<W>, u32)> {
-        self.packets.iter().zip(self.lanes.iter().copied())
+    fn lots(rays: &[Ray], any_hit: bool) -> Vec<PacketLot<W>> {
+        Lot::cut(rays, any_hit, HitPacket::miss(), |n| n.div_ceil(W), Self::new)
     }
 
     /// Packets a tile at a time, with a bit for each of their rays.
@@ -156,61 +213,24 @@ impl<const W: usize> Packets<W> {
     }
 }
 
-/// Packets of 16 that are traced in tiles, as far as they are alike.
-struct TileRun<'a> {
+type PacketLot<const W: usize> = Lot<Packets<W>, HitPacket<W>, u32>;
+
+/// A mode that takes packets of `W`, and how it traces a lot of them.
+struct PacketRun<'a, const W: usize, C, A> {
     engine: &'a Ours,
-    lots: Vec<Lot<Packets<16>, HitPacket<16>, u32>>,
+    mode: &'static str,
+    lots: Vec<PacketLot<W>>,
+    closest: C,
+    any: A,
 }
 
-impl Contender for TileRun<'_> {
-    fn mode(&self) -> String {
-        Kernel::Tile.name().into()
-    }
-
-    fn build_seconds(&self) -> f64 {
-        self.engine.build_seconds
-    }
-
-    fn bytes(&self) -> u64 {
-        self.engine.bytes
-    }
-
-    fn trace(&self, chunk: usize) {
-        let accel = &self.engine.accel;
-        self.lots[chunk].trace(
-            |rays, hits| {
-                for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
-                    accel.intersect_tile(packets, lanes, out);
-                }
-            },
-            |rays, flags| {
-                for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
-                    accel.occluded_tile(packets, lanes, out);
-                }
-            },
-        );
-    }
-
-    fn results(&self) -> Results {
-        collect(
-            &self.lots,
-            |packets, rays, all| all.extend((0..rays.rays).map(|i| packets[i / 16].get(i % 16))),
-            |packets, rays, all| all.extend((0..rays.rays).map(|i| packets[i / 16] >> (i % 16) & 1 == 1)),
-        )
-    }
-}
-
-struct PacketRun<'a, const W: usize> {
-    engine: &'a Ours,
-    lots: Vec<Lot<Packets<W>, HitPacket<W>, u32>>,
-}
-
-impl<const W: usize> Contender for PacketRun<'_, W>
+impl<const W: usize, C, A> Contender for PacketRun<'_, W, C, A>
 where
-    RayPacket<W>: PacketWidth<W>,
+    C: Fn(&Accel, &Packets<W>, &mut [HitPacket<W>]) + Sync,
+    A: Fn(&Accel, &Packets<W>, &mut [u32]) + Sync,
 {
     fn mode(&self) -> String {
-        Kernel::of_width(W).map_or("packet", Kernel::name).into()
+        self.mode.into()
     }
 
     fn build_seconds(&self) -> f64 {
@@ -224,16 +244,8 @@ where
     fn trace(&self, chunk: usize) {
         let accel = &self.engine.accel;
         self.lots[chunk].trace(
-            |rays, hits| {
-                for ((packet, lanes), out) in rays.with_lanes().zip(hits) {
-                    *out = accel.intersect_packet(packet, lanes);
-                }
-            },
-            |rays, flags| {
-                for ((packet, lanes), out) in rays.with_lanes().zip(flags) {
-                    *out = accel.occluded_packet(packet, lanes);
-                }
-            },
+            |rays, hits| (self.closest)(accel, rays, hits),
+            |rays, flags| (self.any)(accel, rays, flags),
         );
     }
 

@@ -2,7 +2,6 @@
 
 use super::outline::Block;
 use crate::simd::Lanes;
-use crate::traverse::lanes::RayPacket;
 
 /// A beam's rays, and what they have found.
 pub trait Bundle<L: Lanes<16>> {
@@ -43,16 +42,4 @@ pub fn load_part<const N: usize, R: Lanes<N>>(row: &[f32; 16], part: usize) -> R
 #[inline(always)]
 pub fn load_part3<const N: usize, R: Lanes<N>>(rows: &[[f32; 16]; 3], part: usize) -> [R; 3] {
     [load_part(&rows[0], part), load_part(&rows[1], part), load_part(&rows[2], part)]
-}
-
-/// A part of a packet as a packet.
-#[inline(always)]
-pub fn part_packet<const N: usize>(all: &RayPacket<16>, part: usize) -> RayPacket<N> {
-    let row = |row| *part_of(row, part);
-    RayPacket {
-        origin: [row(&all.origin[0]), row(&all.origin[1]), row(&all.origin[2])],
-        direction: [row(&all.direction[0]), row(&all.direction[1]), row(&all.direction[2])],
-        tnear: row(&all.tnear),
-        tfar: row(&all.tfar),
-    }
 }

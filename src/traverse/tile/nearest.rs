@@ -1,7 +1,7 @@
 //! Rays of a beam from its apex that ask for their closest hits.
 
 use super::beam::{Beam, PACKETS};
-use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut, part_packet};
+use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3};
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
@@ -114,13 +114,7 @@ where
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
             let found =
                 self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, self.records, again);
-            *part_mut(&mut hits.t, part) = found.t;
-            *part_mut(&mut hits.u, part) = found.u;
-            *part_mut(&mut hits.v, part) = found.v;
-            *part_mut(&mut hits.primitive, part) = found.primitive;
-            for axis in 0..3 {
-                *part_mut(&mut hits.normal[axis], part) = found.normal[axis];
-            }
+            hits.set_part(part, &found);
         }
     }
 
@@ -189,7 +183,7 @@ where
     fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
         let mut changed = false;
         for part in 0..16 / N {
-            let rays = part_packet::<N>(&self.rays[packet], part);
+            let rays = self.rays[packet].part::<N>(part);
             let active = self.active[packet] >> (part * N) & ((1 << N) - 1);
             let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
             let speed = R::load(&rays.direction[self.beam.frame.axes[2]]).abs();

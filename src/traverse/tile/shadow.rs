@@ -6,7 +6,7 @@
 //! their own origins: those that graze an edge, and those that leave or meet the triangle.
 
 use super::beam::PACKETS;
-use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut, part_packet};
+use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut};
 use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
@@ -206,7 +206,7 @@ where
             if lanes == 0 {
                 continue;
             }
-            let rays = part_packet::<N>(&self.rays[packet], part);
+            let rays = self.rays[packet].part::<N>(part);
             let (walk, inside) = Walk::<N, R>::new(&rays, lanes, self.tree.bounds());
             let start = load_part::<N, R>(&self.seen.start[packet], part);
             let speed = load_part::<N, R>(&self.seen.speed[packet], part);

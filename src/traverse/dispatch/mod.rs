@@ -1,0 +1,93 @@
+//! The kernel that is quickest for the rays at hand.
+//!
+//! Where triangles are larger than pixels, a square's rays go best together in a beam; where they are
+//! smaller, packet by packet; and where each ray of a packet meets triangles of its own, in smaller
+//! packets. Pictures hold all of that. How quick a kernel is hangs on the model, the view, the machine and
+//! its instruction set, and nothing that could be known beforehand tells it as well as having tried: so a
+//! [`Dispatch`] times what it does, square by square, and does what was quickest nearby. Only time hangs
+//! on the choice: hits are the same, bit for bit.
+
+mod choice;
+
+use super::accel::Accel;
+use super::kernel::Kernel;
+use super::lanes::{HitPacket, RayPacket};
+use choice::Choice;
+use std::time::Instant;
+
+/// The kernels that it chooses among.
+const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
+
+/// Fewer rays than this say nothing about a kernel: reading the clock takes as long.
+const LEAST_RAYS: u32 = 64;
+
+/// What one worker has learnt about which kernel is quickest: for closest hits, and for any hit.
+///
+/// It is meant for rays that come in the order of a picture, each square's together, one `Dispatch` for
+/// each kind of ray and each thread.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Dispatch {
+    closest: Choice<{ WAYS.len() }>,
+    any: Choice<{ WAYS.len() }>,
+}
+
+impl Dispatch {
+    /// As [`Accel::intersect_tile`], by the kernel that is quickest.
+    pub fn intersect(
+        &mut self,
+        accel: &Accel,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [HitPacket<16>],
+    ) {
+        timed(&mut self.closest, active, |kernel| match kernel {
+            Kernel::Tile => accel.intersect_tile(rays, active, hits),
+            Kernel::Packet8 => {
+                for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
+                    *hits = accel.intersect_halves(rays, active);
+                }
+            }
+            _ => {
+                for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
+                    *hits = accel.intersect_packet(rays, active);
+                }
+            }
+        });
+    }
+
+    /// As [`Accel::occluded_tile`], by the kernel that is quickest.
+    pub fn occluded(&mut self, accel: &Accel, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
+        timed(&mut self.any, active, |kernel| match kernel {
+            Kernel::Tile => accel.occluded_tile(rays, active, occluded),
+            Kernel::Packet8 => {
+                for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
+                    *occluded = accel.occluded_halves(rays, active);
+                }
+            }
+            _ => {
+                for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
+                    *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
+                }
+            }
+        });
+    }
+
+    /// The kernels that are thought to be quickest at the moment: for closest hits, and for any hit.
+    pub fn quickest(&self) -> [Kernel; 2] {
+        [WAYS[self.closest.quickest()], WAYS[self.any.quickest()]]
+    }
+}
+
+/// Has a kernel trace the lanes in `active`, and takes note of how long that took.
+#[inline(always)]
+fn timed(choice: &mut Choice<{ WAYS.len() }>, active: &[u32], trace: impl FnOnce(Kernel)) {
+    let rays: u32 = active.iter().map(|lanes| lanes.count_ones()).sum();
+    if rays < LEAST_RAYS {
+        trace(WAYS[choice.quickest()]);
+        return;
+    }
+    let way = choice.next();
+    let start = Instant::now();
+    trace(WAYS[way]);
+    choice.record(way, u64::from(rays), start.elapsed());
+}
