@@ -46,30 +46,12 @@ pub trait Lanes<const W: usize>:
     /// The least lane. No lane may be NaN.
     #[inline(always)]
     fn least(self) -> f32 {
-        let mut values = self.store();
-        let mut width = W;
-        while width > 1 {
-            width /= 2;
-            for lane in 0..width {
-                let other = values[lane + width];
-                values[lane] = if other < values[lane] { other } else { values[lane] };
-            }
-        }
-        values[0]
+        fold::<W>(self.store(), |a, b| if b < a { b } else { a })
     }
     /// The greatest lane. No lane may be NaN.
     #[inline(always)]
     fn greatest(self) -> f32 {
-        let mut values = self.store();
-        let mut width = W;
-        while width > 1 {
-            width /= 2;
-            for lane in 0..width {
-                let other = values[lane + width];
-                values[lane] = if other > values[lane] { other } else { values[lane] };
-            }
-        }
-        values[0]
+        fold::<W>(self.store(), |a, b| if b > a { b } else { a })
     }
     /// One lane's value in every lane. Panics if there is no such lane.
     #[inline(always)]
@@ -101,6 +83,19 @@ pub trait Lanes<const W: usize>:
     fn ids_select(mask: Self::Mask, a: Self::Ids, b: Self::Ids) -> Self::Ids;
     /// Lane `i` becomes element `i`.
     fn ids_store(ids: Self::Ids) -> [i32; W];
+}
+
+/// Folds lanes by halves, as registers do it best. `W` is a power of two.
+#[inline(always)]
+fn fold<const W: usize>(mut values: [f32; W], of: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut width = W;
+    while width > 1 {
+        width /= 2;
+        for lane in 0..width {
+            values[lane] = of(values[lane], values[lane + width]);
+        }
+    }
+    values[0]
 }
 
 /// The vector types of an instruction set.

@@ -6,9 +6,10 @@
 //! A stock build is therefore fast on every x86-64, and `wide` alone, which chooses at compile
 //! time, serves as the portable implementation and as the reference.
 //!
-//! No operation here fuses a multiplication with an addition: each is rounded on its own, so
-//! every instruction set gives the same bits, and the sign arguments of the watertight triangle
-//! test hold (a fused difference of products can have the wrong sign).
+//! No operation that a hit depends on fuses a multiplication with an addition: each is rounded on its
+//! own, so every instruction set gives the same bits, and the sign arguments of the watertight
+//! triangle test hold (a fused difference of products can have the wrong sign). [`Lanes::mul_add`]
+//! alone may fuse: it is for bounds.
 
 mod isa;
 mod lanes;

@@ -2,15 +2,15 @@
 
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
-use super::packet;
-use super::tile::{self, PACKETS, TileCounts};
+use super::query::{CountTile, InMode, IntersectPacket, IntersectTile, OccludedPacket, OccludedTile, Query};
+use super::tile::{PACKETS, TileCounts};
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
-use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
+use crate::geometry::triangle::{Exact, Fast, Watertight};
 use crate::geometry::{Aabb, Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, BuildProgress, KdTree, TreeStats};
 use crate::mesh::Mesh;
-use crate::simd::{Chosen, Isa, Simd, Task};
+use crate::simd::{Chosen, Isa};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -107,6 +107,20 @@ impl Accel {
         self.tree.stats()
     }
 
+    /// Has a kernel called in the chosen mode, on the chosen instruction set.
+    #[inline(always)]
+    fn ask<Q: Query>(&self, query: Q) -> Q::Output {
+        let tree = &*self.tree;
+        let triangles = tree.triangles();
+        match self.accuracy {
+            Accuracy::Fast => self.chosen.run(InMode::<_, Fast> { query, tree, records: &self.projected }),
+            Accuracy::Watertight => {
+                self.chosen.run(InMode::<_, Watertight> { query, tree, records: triangles })
+            }
+            Accuracy::Exact => self.chosen.run(InMode::<_, Exact> { query, tree, records: triangles }),
+        }
+    }
+
     /// The closest hit of one ray.
     pub fn intersect(&self, ray: &Ray) -> Hit {
         self.intersect_packet(&RayPacket::<1>::of_slice(&[*ray]), 1).get(0)
@@ -123,21 +137,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        let (tree, active) = (&*self.tree, active & lanes_of(W));
-        match self.accuracy {
-            Accuracy::Fast => {
-                self.chosen.run(IntersectPacket::<W, Fast> { tree, records: &self.projected, rays, active })
-            }
-            Accuracy::Watertight => self.chosen.run(IntersectPacket::<W, Watertight> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-            }),
-            Accuracy::Exact => {
-                self.chosen.run(IntersectPacket::<W, Exact> { tree, records: tree.triangles(), rays, active })
-            }
-        }
+        self.ask(IntersectPacket { rays, active: active & lanes_of(W) })
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies.
@@ -146,21 +146,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        let (tree, active) = (&*self.tree, active & lanes_of(W));
-        match self.accuracy {
-            Accuracy::Fast => {
-                self.chosen.run(OccludedPacket::<W, Fast> { tree, records: &self.projected, rays, active })
-            }
-            Accuracy::Watertight => self.chosen.run(OccludedPacket::<W, Watertight> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-            }),
-            Accuracy::Exact => {
-                self.chosen.run(OccludedPacket::<W, Exact> { tree, records: tree.triangles(), rays, active })
-            }
-        }
+        self.ask(OccludedPacket { rays, active: active & lanes_of(W) })
     }
 
     /// [`intersect_packet`](Self::intersect_packet) in two packets of 8: quicker where rays part.
@@ -191,32 +177,9 @@ impl Accel {
     pub fn intersect_tile(&self, rays: &[RayPacket<16>], active: &[u32], hits: &mut [HitPacket<16>]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         let lanes = tile_lanes(rays, active);
-        let (tree, active) = (&*self.tree, &lanes);
-        let done = match self.accuracy {
-            Accuracy::Fast => self.chosen.run(IntersectTile::<Fast> {
-                tree,
-                records: &self.projected,
-                rays,
-                active,
-                hits: &mut *hits,
-            }),
-            Accuracy::Watertight => self.chosen.run(IntersectTile::<Watertight> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-                hits: &mut *hits,
-            }),
-            Accuracy::Exact => self.chosen.run(IntersectTile::<Exact> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-                hits: &mut *hits,
-            }),
-        };
+        let done = self.ask(IntersectTile { rays, active: &lanes, hits: &mut *hits });
         if !done {
-            for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
+            for ((rays, active), hits) in rays.iter().zip(lanes).zip(hits) {
                 *hits = self.intersect_packet(rays, active);
             }
         }
@@ -225,8 +188,9 @@ impl Accel {
     /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, or, with `any_hit`,
     /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
-        let (tree, active) = (&*self.tree, &tile_lanes(rays, active));
-        let done = self.chosen.run(CountTile { tree, rays, active, any_hit, counts });
+        let query = CountTile { rays, active: &tile_lanes(rays, active), any_hit, counts: &mut *counts };
+        let (tree, records) = (&*self.tree, self.tree.triangles());
+        let done = self.chosen.run(InMode::<_, Watertight> { query, tree, records });
         counts.beams += u64::from(done);
     }
 
@@ -236,32 +200,9 @@ impl Accel {
     pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         let lanes = tile_lanes(rays, active);
-        let (tree, active) = (&*self.tree, &lanes);
-        let done = match self.accuracy {
-            Accuracy::Fast => self.chosen.run(OccludedTile::<Fast> {
-                tree,
-                records: &self.projected,
-                rays,
-                active,
-                found: &mut *occluded,
-            }),
-            Accuracy::Watertight => self.chosen.run(OccludedTile::<Watertight> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-                found: &mut *occluded,
-            }),
-            Accuracy::Exact => self.chosen.run(OccludedTile::<Exact> {
-                tree,
-                records: tree.triangles(),
-                rays,
-                active,
-                found: &mut *occluded,
-            }),
-        };
+        let done = self.ask(OccludedTile { rays, active: &lanes, found: &mut *occluded });
         if !done {
-            for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
+            for ((rays, active), occluded) in rays.iter().zip(lanes).zip(occluded) {
                 *occluded = self.occluded_packet(rays, active);
             }
         }
@@ -368,111 +309,4 @@ fn tile_lanes(rays: &[RayPacket<16>], active: &[u32]) -> [u32; PACKETS] {
 /// The first `count` lanes, at most 16.
 const fn lanes_of(count: usize) -> u32 {
     (1 << count) - 1
-}
-
-struct IntersectPacket<'a, const W: usize, M: Mode> {
-    tree: &'a KdTree,
-    records: &'a [M::Record],
-    rays: &'a RayPacket<W>,
-    active: u32,
-}
-
-impl<const W: usize, M: Mode> Task for IntersectPacket<'_, W, M>
-where
-    RayPacket<W>: PacketWidth<W>,
-{
-    type Output = HitPacket<W>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> HitPacket<W> {
-        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(
-            self.tree,
-            self.records,
-            self.rays,
-            self.active,
-        )
-    }
-}
-
-struct OccludedPacket<'a, const W: usize, M: Mode> {
-    tree: &'a KdTree,
-    records: &'a [M::Record],
-    rays: &'a RayPacket<W>,
-    active: u32,
-}
-
-impl<const W: usize, M: Mode> Task for OccludedPacket<'_, W, M>
-where
-    RayPacket<W>: PacketWidth<W>,
-{
-    type Output = u32;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> u32 {
-        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(
-            self.tree,
-            self.records,
-            self.rays,
-            self.active,
-        )
-    }
-}
-
-struct IntersectTile<'a, M: Mode> {
-    tree: &'a KdTree,
-    records: &'a [M::Record],
-    rays: &'a [RayPacket<16>],
-    active: &'a [u32; PACKETS],
-    hits: &'a mut [HitPacket<16>],
-}
-
-impl<M: Mode> Task for IntersectTile<'_, M> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { tree, records, rays, active, hits } = self;
-        tile::intersect::<S, _, M, _>(tree, records, rays, active, hits, &mut ())
-    }
-}
-
-struct OccludedTile<'a, M: Mode> {
-    tree: &'a KdTree,
-    records: &'a [M::Record],
-    rays: &'a [RayPacket<16>],
-    active: &'a [u32; PACKETS],
-    found: &'a mut [u32],
-}
-
-impl<M: Mode> Task for OccludedTile<'_, M> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        tile::occluded::<S, _, M, _>(self.tree, self.records, self.rays, self.active, self.found, &mut ())
-    }
-}
-
-struct CountTile<'a> {
-    tree: &'a KdTree,
-    rays: &'a [RayPacket<16>],
-    active: &'a [u32; PACKETS],
-    any_hit: bool,
-    counts: &'a mut TileCounts,
-}
-
-impl Task for CountTile<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> bool {
-        let Self { tree, rays, active, any_hit, counts } = self;
-        if any_hit {
-            let found = &mut [0; PACKETS][..rays.len()];
-            tile::occluded::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, found, counts)
-        } else {
-            let hits = &mut [const { HitPacket::miss() }; PACKETS][..rays.len()];
-            tile::intersect::<S, _, Watertight, _>(tree, tree.triangles(), rays, active, hits, counts)
-        }
-    }
 }

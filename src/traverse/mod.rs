@@ -15,6 +15,7 @@ mod dispatch;
 mod kernel;
 mod lanes;
 mod packet;
+mod query;
 mod range;
 mod stack;
 mod tile;

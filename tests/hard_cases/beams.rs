@@ -223,6 +223,14 @@ fn rays_to_a_light_go_together_and_see_the_same() {
                     .collect();
                 scene.trace(&rays);
                 parallel += beams(&scene.mesh, &rays, true);
+                // One that starts nowhere among them.
+                let mut rays = rays[..rays.len().min(512)].to_vec();
+                for (place, coordinate) in [(40, f32::NAN), (300, f32::NEG_INFINITY)] {
+                    if let Some(ray) = rays.get_mut(place) {
+                        ray.origin.y = coordinate;
+                    }
+                }
+                scene.trace(&rays);
             }
         }
         assert!(meeting > 0 && parallel > 0, "{name}: {meeting} beams toward lights, {parallel} parallel");

@@ -33,7 +33,7 @@ pub use agreement::Agreement;
 pub use engine::Results;
 pub use machine::hardware_threads;
 pub use race::Pace;
-pub use report::{EngineInfo, Header, Report, Row};
+pub use report::{Beams, EngineInfo, Header, Report, Row};
 
 use crate::error::{Error, Result};
 use crate::geometry::{Accuracy, Hit, Ray};
@@ -166,6 +166,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             light: setup.light.to_array(),
         },
         rows: Vec::new(),
+        beams: Vec::new(),
         agreements: Vec::new(),
         notes,
     };
@@ -178,6 +179,10 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             continue;
         }
         race_kind(&engines, kind, &rays, options, &mut report, progress);
+        if options.engines.contains(&EngineName::Raypack) {
+            let beams = ours.beams(kind, &rays);
+            report.beams.extend((beams.counts.beams > 0).then_some(beams));
+        }
     }
     Ok(report)
 }

@@ -4,12 +4,14 @@
 //! records go out in the kernel's own form.
 
 use super::engine::{Contender, Engine, Lot, Results, collect};
+use super::report::Beams;
 use crate::error::Result;
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::simd::Isa;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket};
+use crate::study::rays::RayKind;
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -42,6 +44,16 @@ impl Ours {
     /// The built tree.
     pub fn accel(&self) -> &Accel {
         &self.accel
+    }
+
+    /// What the tile kernel does with rays.
+    pub fn beams(&self, kind: RayKind, rays: &[Ray]) -> Beams {
+        let mut counts = TileCounts::default();
+        for rays in rays.chunks(TILE * 16) {
+            let Packets { packets, lanes, .. } = Packets::<16>::new(rays);
+            self.accel.count_tile(&packets, &lanes, kind.any_hit(), &mut counts);
+        }
+        Beams { rays: kind, tiles: rays.len().div_ceil(TILE * 16), counts }
     }
 
     /// A mode that traces packets of `W` one by one.

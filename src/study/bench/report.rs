@@ -3,6 +3,7 @@
 use super::agreement::Agreement;
 use crate::geometry::Accuracy;
 use crate::study::rays::RayKind;
+use crate::traverse::TileCounts;
 use serde::Serialize;
 
 /// Everything that a bench found.
@@ -12,6 +13,8 @@ pub struct Report {
     pub header: Header,
     /// A row for each engine, mode, kind of ray and number of threads.
     pub rows: Vec<Row>,
+    /// What raypack's beams did with each kind of ray that made any.
+    pub beams: Vec<Beams>,
     /// How the engines' answers compare.
     pub agreements: Vec<Agreement>,
     /// What was left out and why, a line each.
@@ -94,6 +97,17 @@ pub struct Row {
     pub build_seconds: f64,
     /// Bytes that the mode's tree holds.
     pub bytes: u64,
+}
+
+/// What raypack's tile kernel did with a set of rays, counted in a run of its own.
+#[derive(Clone, Debug, Serialize)]
+pub struct Beams {
+    /// The kind of ray.
+    pub rays: RayKind,
+    /// Tiles of up to 256 rays.
+    pub tiles: usize,
+    /// The counts of all of them.
+    pub counts: TileCounts,
 }
 
 impl Report {

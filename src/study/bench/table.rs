@@ -1,6 +1,6 @@
 //! The report as text: one table of best modes, one of all of them.
 
-use super::report::{Report, Row};
+use super::report::{Beams, Report, Row};
 use crate::study::text::{figure, grid, grouped};
 use std::fmt;
 
@@ -24,6 +24,10 @@ impl fmt::Display for Report {
         write!(f, "{}", grid(&self.summary()))?;
         writeln!(f, "\nEvery mode that ran\n")?;
         write!(f, "{}", grid(&self.modes()))?;
+        if !self.beams.is_empty() {
+            writeln!(f, "\nWhat a beam of up to 256 rays does in raypack's tile kernel, on average\n")?;
+            write!(f, "{}", grid(&self.beam_lines()))?;
+        }
         if !self.agreements.is_empty() {
             writeln!(f, "\nDisagreements (hit against miss, or t apart by more than 1e-4)\n")?;
             write!(f, "{}", grid(&self.agreement_lines()))?;
@@ -33,6 +37,41 @@ impl fmt::Display for Report {
 }
 
 impl Report {
+    /// A line for each kind of ray that made beams.
+    fn beam_lines(&self) -> Vec<Vec<String>> {
+        let head = [
+            "rays",
+            "tiles",
+            "beams",
+            "nodes",
+            "packets in a node",
+            "pages",
+            "blocks",
+            "triangles",
+            "left for the beam",
+            "packet tests",
+            "packets alone",
+        ];
+        let line = |beams: &Beams| {
+            let c = &beams.counts;
+            let each = |count: u64| figure(count as f64 / c.beams.max(1) as f64);
+            vec![
+                beams.rays.name().into(),
+                grouped(beams.tiles as u64),
+                grouped(c.beams),
+                each(c.nodes),
+                figure(c.node_packets as f64 / c.nodes.max(1) as f64),
+                each(c.pages),
+                each(c.blocks),
+                each(c.triangles),
+                each(c.left),
+                each(c.tests),
+                each(c.alone),
+            ]
+        };
+        [head.map(String::from).into()].into_iter().chain(self.beams.iter().map(line)).collect()
+    }
+
     /// A line for each race: every engine's best mode, and raypack's ratio to each rival.
     fn summary(&self) -> Vec<Vec<String>> {
         let names: Vec<&str> = self.header.engines.iter().map(|e| e.name).collect();

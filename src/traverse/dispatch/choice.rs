@@ -19,8 +19,9 @@ pub struct Choice<const WAYS: usize> {
 /// Lots that each way is tried with at the start: the first of them fetch the model's data for all.
 const FIRST: u32 = 3;
 
-/// How much a new figure counts.
+/// How much a new figure counts, and how much one of a way that has not been taken for long.
 const WEIGHT: f32 = 0.4;
+const WEIGHT_OF_TRIAL: f32 = 0.7;
 
 /// A figure that is so many times as high counts as no more: something else ran meanwhile.
 const SPIKE: f32 = 4.0;
@@ -71,7 +72,8 @@ impl<const WAYS: usize> Choice<WAYS> {
             self.taken[way] += 1;
             self.cost[way] = new;
         } else {
-            self.cost[way] = old + (new.min(old * SPIKE) - old) * WEIGHT;
+            let weight = if way == self.quickest() { WEIGHT } else { WEIGHT_OF_TRIAL };
+            self.cost[way] = old + (new.min(old * SPIKE) - old) * weight;
         }
     }
 }

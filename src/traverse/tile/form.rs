@@ -189,6 +189,8 @@ pub fn of_form<L: Lanes<16>>(
                 let first = *first_direction.get_or_insert_with(|| direction(rays, lane));
                 for axis in 0..3 {
                     belongs = belongs & L::load(&rays.direction[axis]).eq(L::splat(first[axis]));
+                    // Nothing else asks where they start.
+                    belongs = belongs & o[axis].abs().le(L::splat(f32::MAX));
                 }
             }
         }

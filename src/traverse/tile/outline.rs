@@ -165,15 +165,21 @@ impl Block {
         }
     }
 
-    /// Puts a triangle into a lane.
+    /// Puts triangles into the first lanes, four at a time, so that rows are written four numbers at a
+    /// time; what lanes beyond the last hold means nothing. `triangle` gives the one with an id.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, triangle: &Triangle) {
-        let lane = lane & 15;
-        for i in 0..3 {
-            for j in 0..3 {
-                self.corners[i][j][lane] = triangle.corners[i][j];
+    pub fn fill<'t>(&mut self, primitives: &[u32], triangle: impl Fn(u32) -> &'t Triangle) {
+        for (quad, ids) in primitives.chunks(4).enumerate().take(4) {
+            // The last lanes of the last quad repeat its first.
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| triangle(*ids.get(i).unwrap_or(&ids[0])));
+            for i in 0..3 {
+                for j in 0..3 {
+                    let numbers = [a.corners[i][j], b.corners[i][j], c.corners[i][j], d.corners[i][j]];
+                    self.corners[i][j].as_chunks_mut::<4>().0[quad & 3] = numbers;
+                }
+                let numbers = [a.plane[i], b.plane[i], c.plane[i], d.plane[i]];
+                self.normal[i].as_chunks_mut::<4>().0[quad & 3] = numbers;
             }
-            self.normal[i][lane] = triangle.plane[i];
         }
     }
 

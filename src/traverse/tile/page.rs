@@ -11,10 +11,10 @@ use crate::simd::{Lanes, Mask};
 use crate::traverse::stack::Stack;
 use crate::traverse::walk::Interval;
 
-/// The work after which a tile is given up: some five times what a tile takes whose rays are worth
+/// The work after which a tile is given up: some four times what a tile takes whose rays are worth
 /// tracing together. Rays that are not, because each packet's go all over the place, or because there are
 /// many triangles between one ray and the next, would meet every triangle in a packet's window.
-const WORK: u32 = 4096;
+const WORK: u32 = 2560;
 
 /// The work of a block, of culling a triangle for packets, and of a packet's test, in steps of about one
 /// upper node.
@@ -140,9 +140,8 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
             self.work += BLOCK_WORK;
 
             // Cull for the beam.
-            for (lane, &primitive) in primitives.iter().enumerate() {
-                self.block.set(lane, self.tree.triangle(primitive));
-            }
+            let tree = self.tree;
+            self.block.fill(primitives, |primitive| tree.triangle(primitive));
             let outline = self.block.outline(self.beam);
             let present = (1 << primitives.len()) - 1;
             let left = outline.meets(&all).bits() & present;
