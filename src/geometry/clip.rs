@@ -8,7 +8,6 @@
 
 use super::Aabb;
 use super::triangle::Corners;
-use glam::Vec3;
 
 /// A corner of the clipped polygon and how far it may be off, axis by axis.
 #[derive(Clone, Copy)]
@@ -38,29 +37,37 @@ pub struct Polygon {
 }
 
 impl Polygon {
+    /// Nothing.
+    const NONE: Self = Self { vertices: [NOWHERE; MAX_VERTICES], count: 0, step_error: [0.0; 3] };
+
     /// A whole triangle. Its corners must be finite.
     pub fn new(corners: &Corners) -> Self {
-        let mut vertices = [NOWHERE; MAX_VERTICES];
-        let mut step_error = [0f64; 3];
-        for (vertex, corner) in vertices.iter_mut().zip(corners) {
-            vertex.at = corner.map(f64::from);
+        let mut polygon = Self::NONE;
+        polygon.start(corners);
+        polygon
+    }
+
+    /// Becomes a whole triangle.
+    #[inline]
+    fn start(&mut self, corners: &Corners) {
+        self.count = 3;
+        self.step_error = [0.0; 3];
+        for (vertex, corner) in self.vertices.iter_mut().zip(corners) {
+            *vertex = Vertex { at: corner.map(f64::from), ..NOWHERE };
             for axis in 0..3 {
-                step_error[axis] = step_error[axis].max(vertex.at[axis].abs() * INTERPOLATION_ERROR);
+                self.step_error[axis] =
+                    self.step_error[axis].max(vertex.at[axis].abs() * INTERPOLATION_ERROR);
             }
         }
-        Self { vertices, count: 3, step_error }
+    }
+
+    fn vertices(&self) -> &[Vertex] {
+        &self.vertices[..self.count]
     }
 
     /// Whether nothing is left.
     pub fn is_empty(&self) -> bool {
         self.count == 0
-    }
-
-    /// Least and greatest coordinate along an axis, widened by the error bounds.
-    pub fn range(&self, axis: usize) -> (f64, f64) {
-        self.vertices[..self.count].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), vertex| {
-            (low.min(vertex.at[axis] - vertex.error[axis]), high.max(vertex.at[axis] + vertex.error[axis]))
-        })
     }
 
     /// Least and greatest coordinate along an axis, narrowed by the error bounds: what the true
@@ -76,34 +83,74 @@ impl Polygon {
     /// at most `position` if `below`, of at least `position` otherwise. What could lie there
     /// within its error is kept.
     pub fn clip(&mut self, axis: usize, position: f32, below: bool) {
+        if self.reaches_beyond(axis, position, below) {
+            let mut kept = Self::NONE;
+            self.cut(axis, position, below, &mut kept);
+            *self = kept;
+        }
+    }
+
+    /// Whether [`Polygon::clip`] has anything to do.
+    #[inline]
+    fn reaches_beyond(&self, axis: usize, position: f32, below: bool) -> bool {
+        let position = f64::from(position);
+        self.vertices().iter().any(|v| if below { v.at[axis] > position } else { v.at[axis] < position })
+    }
+
+    /// Writes to `kept` what [`Polygon::clip`] keeps.
+    fn cut(&self, axis: usize, position: f32, below: bool, kept: &mut Self) {
         let position = f64::from(position);
         let sign = if below { -1.0 } else { 1.0 };
         let distance = |v: &Vertex| (v.at[axis] - position) * sign;
-        let old = &self.vertices[..self.count];
-        if old.iter().all(|v| distance(v) >= 0.0) {
-            return;
-        }
-
-        let mut kept = [NOWHERE; MAX_VERTICES];
-        let mut count = 0;
-        let mut keep = |vertex: Vertex| {
-            if count < MAX_VERTICES {
-                kept[count] = vertex;
-                count += 1;
-            }
-        };
-        for (i, from) in old.iter().enumerate() {
-            let to = &old[(i + 1) % old.len()];
-            let (df, dt) = (distance(from), distance(to));
-            if df >= -from.error[axis] {
-                let certain = from.certain && df >= from.error[axis];
-                keep(Vertex { certain, ..*from });
-            }
+        kept.count = 0;
+        kept.step_error = self.step_error;
+        let old = self.vertices();
+        let Some(mut from) = old.last() else { return };
+        let mut df = distance(from);
+        for to in old {
+            let dt = distance(to);
             if (df > 0.0 && dt < 0.0) || (df < 0.0 && dt > 0.0) {
-                keep(self.crossing(from, to, [df, dt], axis, position));
+                kept.keep(self.crossing(from, to, [df, dt], axis, position));
             }
+            if dt >= -to.error[axis] {
+                let certain = to.certain && dt >= to.error[axis];
+                kept.keep(Vertex { certain, ..*to });
+            }
+            (from, df) = (to, dt);
         }
-        (self.vertices, self.count) = (kept, count);
+    }
+
+    #[inline]
+    fn keep(&mut self, vertex: Vertex) {
+        if let Some(free) = self.vertices.get_mut(self.count) {
+            *free = vertex;
+            self.count += 1;
+        }
+    }
+
+    /// The bounds of what lies below a plane and above it, the plane included in both; empty where
+    /// nothing does.
+    fn bounds_of_halves(&self, axis: usize, position: f32) -> [Aabb; 2] {
+        let position = f64::from(position);
+        let [mut below, mut above] = [Range::EMPTY; 2];
+        let Some(mut from) = self.vertices().last() else { return [Aabb::EMPTY; 2] };
+        let mut df = from.at[axis] - position;
+        for to in self.vertices() {
+            let dt = to.at[axis] - position;
+            if (df > 0.0 && dt < 0.0) || (df < 0.0 && dt > 0.0) {
+                let crossing = self.crossing(from, to, [df, dt], axis, position);
+                below.grow(&crossing);
+                above.grow(&crossing);
+            }
+            if dt <= to.error[axis] {
+                below.grow(to);
+            }
+            if dt >= -to.error[axis] {
+                above.grow(to);
+            }
+            (from, df) = (to, dt);
+        }
+        [below.rounded(), above.rounded()]
     }
 
     /// Where the edge between two vertices crosses the plane that they are `distances` away from, on
@@ -128,33 +175,84 @@ impl Polygon {
         }
         point
     }
+}
 
-    /// The least box of floats around the polygon and its errors.
-    fn bounds(&self) -> Aabb {
+/// Bounds in the making.
+#[derive(Clone, Copy)]
+struct Range {
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Range {
+    const EMPTY: Self = Self { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
+
+    /// Takes in a vertex and its error.
+    #[inline]
+    fn grow(&mut self, vertex: &Vertex) {
+        for axis in 0..3 {
+            // Not `f64::min`: nothing here is NaN, and this is one instruction.
+            let (low, high) = (vertex.at[axis] - vertex.error[axis], vertex.at[axis] + vertex.error[axis]);
+            self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
+            self.high[axis] = if high > self.high[axis] { high } else { self.high[axis] };
+        }
+    }
+
+    /// The least box of floats around it.
+    fn rounded(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         for axis in 0..3 {
-            let (low, high) = self.range(axis);
-            bounds.min[axis] = round_down(low);
-            bounds.max[axis] = round_up(high);
+            bounds.min[axis] = round_down(self.low[axis]);
+            bounds.max[axis] = round_up(self.high[axis]);
         }
         bounds
     }
 }
 
-/// The bounds of the part of a triangle inside a box, itself inside the box; `None` where they
-/// share no point. Faces of the box belong to it.
-pub fn clipped_bounds(corners: &Corners, within: &Aabb) -> Option<Aabb> {
-    let mut polygon = Polygon::new(corners);
-    for axis in 0..3 {
-        polygon.clip(axis, within.min[axis], false);
-        polygon.clip(axis, within.max[axis], true);
-        if polygon.is_empty() {
-            return None;
-        }
+/// Clips triangles, with memory that it keeps from one to the next.
+pub struct Clipper {
+    /// What a plane is about to cut, and where the rest goes.
+    polygons: [Polygon; 2],
+}
+
+impl Default for Clipper {
+    fn default() -> Self {
+        Self { polygons: [const { Polygon::NONE }; 2] }
     }
-    let bounds = polygon.bounds();
-    let inside = Aabb { min: Vec3::max(bounds.min, within.min), max: Vec3::min(bounds.max, within.max) };
-    (!inside.is_empty()).then_some(inside)
+}
+
+impl Clipper {
+    /// The bounds of the part of a triangle inside a box on each side of a plane across it: below, and
+    /// above. Each lies inside its half of the box; `None` where the triangle shares no point with that
+    /// half. Faces and the plane belong to what they bound.
+    pub fn halves(
+        &mut self,
+        corners: &Corners,
+        within: &Aabb,
+        axis: usize,
+        position: f32,
+    ) -> [Option<Aabb>; 2] {
+        let [polygon, spare] = &mut self.polygons;
+        polygon.start(corners);
+        for axis in 0..3 {
+            for (face, below) in [(within.min[axis], false), (within.max[axis], true)] {
+                if polygon.reaches_beyond(axis, face, below) {
+                    polygon.cut(axis, face, below, spare);
+                    std::mem::swap(polygon, spare);
+                    if polygon.is_empty() {
+                        return [None; 2];
+                    }
+                }
+            }
+        }
+        let mut parts =
+            polygon.bounds_of_halves(axis, position).into_iter().zip(within.halves(axis, position));
+        [0, 1].map(|_| {
+            let (part, half) = parts.next()?;
+            let part = Aabb { min: part.min.max(half.min), max: part.max.min(half.max) };
+            (!part.is_empty()).then_some(part)
+        })
+    }
 }
 
 /// The greatest float that is not above `x`.
@@ -172,11 +270,23 @@ fn round_up(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     const TRIANGLE: Corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
     fn cube(min: [f32; 3], max: [f32; 3]) -> Aabb {
         Aabb { min: min.into(), max: max.into() }
+    }
+
+    /// The bounds inside a box that some planes around it cut to size.
+    fn clipped_bounds(corners: &Corners, within: &Aabb) -> Option<Aabb> {
+        let mut clipper = Clipper::default();
+        // A plane in the upper face: all is below.
+        let [below, _] = clipper.halves(corners, within, 0, within.max.x);
+        // One in the lower face: all is above, and the same.
+        let [_, above] = clipper.halves(corners, within, 0, within.min.x);
+        assert_eq!(below, above);
+        below
     }
 
     #[test]
@@ -222,5 +332,21 @@ mod tests {
             }
         }
         assert!(seen > 100);
+    }
+
+    #[test]
+    fn halves_hold_the_parts_on_their_sides() {
+        let mut clipper = Clipper::default();
+        let [below, above] = clipper.halves(&TRIANGLE, &cube([-1.0; 3], [5.0; 3]), 0, 1.0);
+        assert_eq!(below, Some(cube([0.0; 3], [1.0, 4.0, 0.0])));
+        let above = above.expect("most of it");
+        assert_eq!((above.min, above.max.x), (Vec3::new(1.0, 0.0, 0.0), 4.0));
+        assert!(above.max.y >= 3.0 && above.max.y <= 3.0f32.next_up());
+        // The box reaches across the plane, the triangle inside it does not.
+        let corner = cube([2.5, 1.0, -1.0], [4.0, 2.0, 1.0]);
+        let [below, above] = clipper.halves(&TRIANGLE, &corner, 0, 3.5);
+        assert_eq!(above, None);
+        let below = below.expect("the corner at 2.5, 1");
+        assert!(below.max.x >= 3.0 && below.max.x <= 3.0f32.next_up() && below.max.y >= 1.5);
     }
 }
