@@ -9,16 +9,23 @@
 use super::Aabb;
 use super::triangle::Corners;
 
-/// A corner of the clipped polygon and how far it may be off, axis by axis.
+/// A corner of the clipped polygon and how far it may be off, axis by axis. The fourth lanes are there
+/// for registers of four.
 #[derive(Clone, Copy)]
 struct Vertex {
-    at: [f64; 3],
-    error: [f64; 3],
-    /// Whether the true polygon has this vertex, and not just a number near it.
-    certain: bool,
+    at: [f64; 4],
+    /// Its last lane is 0 where the true polygon has this vertex for certain, not just a number near it.
+    error: [f64; 4],
 }
 
-const NOWHERE: Vertex = Vertex { at: [0.0; 3], error: [0.0; 3], certain: true };
+const NOWHERE: Vertex = Vertex { at: [0.0; 4], error: [0.0; 4] };
+
+impl Vertex {
+    /// Whether the true polygon has it.
+    fn is_certain(&self) -> bool {
+        self.error[3] == 0.0
+    }
+}
 
 /// A triangle has three corners, and each of six planes adds at most one; rounding can make a
 /// sliver of a polygon not quite convex, so there is room for a few more.
@@ -33,12 +40,12 @@ pub struct Polygon {
     vertices: [Vertex; MAX_VERTICES],
     count: usize,
     /// Bound of the absolute error that one interpolation adds, axis by axis.
-    step_error: [f64; 3],
+    step_error: [f64; 4],
 }
 
 impl Polygon {
     /// Nothing.
-    const NONE: Self = Self { vertices: [NOWHERE; MAX_VERTICES], count: 0, step_error: [0.0; 3] };
+    const NONE: Self = Self { vertices: [NOWHERE; MAX_VERTICES], count: 0, step_error: [0.0; 4] };
 
     /// A whole triangle. Its corners must be finite.
     pub fn new(corners: &Corners) -> Self {
@@ -48,19 +55,20 @@ impl Polygon {
     }
 
     /// Becomes a whole triangle.
-    #[inline]
+    #[inline(always)]
     fn start(&mut self, corners: &Corners) {
         self.count = 3;
-        self.step_error = [0.0; 3];
-        for (vertex, corner) in self.vertices.iter_mut().zip(corners) {
-            *vertex = Vertex { at: corner.map(f64::from), ..NOWHERE };
-            for axis in 0..3 {
-                self.step_error[axis] =
-                    self.step_error[axis].max(vertex.at[axis].abs() * INTERPOLATION_ERROR);
+        self.step_error = [0.0; 4];
+        for (vertex, &[x, y, z]) in self.vertices.iter_mut().zip(corners) {
+            *vertex = Vertex { at: [x.into(), y.into(), z.into(), 0.0], ..NOWHERE };
+            for axis in 0..4 {
+                let error = vertex.at[axis].abs() * INTERPOLATION_ERROR;
+                self.step_error[axis] = greater(error, self.step_error[axis]);
             }
         }
     }
 
+    #[inline(always)]
     fn vertices(&self) -> &[Vertex] {
         &self.vertices[..self.count]
     }
@@ -73,7 +81,7 @@ impl Polygon {
     /// Least and greatest coordinate along an axis, narrowed by the error bounds: what the true
     /// polygon reaches for certain. An empty range if nothing is.
     pub fn certain_range(&self, axis: usize) -> (f64, f64) {
-        let certain = self.vertices[..self.count].iter().filter(|vertex| vertex.certain);
+        let certain = self.vertices().iter().filter(|vertex| vertex.is_certain());
         certain.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), vertex| {
             (low.min(vertex.at[axis] + vertex.error[axis]), high.max(vertex.at[axis] - vertex.error[axis]))
         })
@@ -91,49 +99,58 @@ impl Polygon {
     }
 
     /// Whether [`Polygon::clip`] has anything to do.
-    #[inline]
+    #[inline(always)]
     fn reaches_beyond(&self, axis: usize, position: f32, below: bool) -> bool {
         let position = f64::from(position);
-        self.vertices().iter().any(|v| if below { v.at[axis] > position } else { v.at[axis] < position })
+        let mut beyond = false;
+        for vertex in self.vertices() {
+            let at = vertex.at[axis];
+            beyond |= if below { at > position } else { at < position };
+        }
+        beyond
     }
 
     /// Writes to `kept` what [`Polygon::clip`] keeps.
+    #[inline(always)]
     fn cut(&self, axis: usize, position: f32, below: bool, kept: &mut Self) {
         let position = f64::from(position);
         let sign = if below { -1.0 } else { 1.0 };
-        let distance = |v: &Vertex| (v.at[axis] - position) * sign;
         kept.count = 0;
         kept.step_error = self.step_error;
-        let old = self.vertices();
-        let Some(mut from) = old.last() else { return };
-        let mut df = distance(from);
-        for to in old {
-            let dt = distance(to);
+        let Some(mut from) = self.vertices().last() else { return };
+        let mut df = (from.at[axis] - position) * sign;
+        for to in self.vertices() {
+            let dt = (to.at[axis] - position) * sign;
             if (df > 0.0 && dt < 0.0) || (df < 0.0 && dt > 0.0) {
-                kept.keep(self.crossing(from, to, [df, dt], axis, position));
+                kept.keep(&self.crossing(from, to, [df, dt], axis, position));
             }
-            if dt >= -to.error[axis] {
-                let certain = to.certain && dt >= to.error[axis];
-                kept.keep(Vertex { certain, ..*to });
+            let error = to.error[axis];
+            if dt >= -error {
+                kept.keep(to);
+                if dt < error {
+                    kept.vertices[kept.count - 1].error[3] = 1.0;
+                }
             }
             (from, df) = (to, dt);
         }
     }
 
-    #[inline]
-    fn keep(&mut self, vertex: Vertex) {
-        if let Some(free) = self.vertices.get_mut(self.count) {
-            *free = vertex;
+    /// Adds a vertex; [`MAX_VERTICES`] are enough.
+    #[inline(always)]
+    fn keep(&mut self, vertex: &Vertex) {
+        if self.count < MAX_VERTICES {
+            self.vertices[self.count] = *vertex;
             self.count += 1;
         }
     }
 
     /// The bounds of what lies below a plane and above it, the plane included in both; empty where
     /// nothing does.
-    fn bounds_of_halves(&self, axis: usize, position: f32) -> [Aabb; 2] {
+    #[inline(always)]
+    fn bounds_of_halves(&self, axis: usize, position: f32) -> [Range; 2] {
         let position = f64::from(position);
         let [mut below, mut above] = [Range::EMPTY; 2];
-        let Some(mut from) = self.vertices().last() else { return [Aabb::EMPTY; 2] };
+        let Some(mut from) = self.vertices().last() else { return [below, above] };
         let mut df = from.at[axis] - position;
         for to in self.vertices() {
             let dt = to.at[axis] - position;
@@ -150,62 +167,81 @@ impl Polygon {
             }
             (from, df) = (to, dt);
         }
-        [below.rounded(), above.rounded()]
+        [below, above]
     }
 
     /// Where the edge between two vertices crosses the plane that they are `distances` away from, on
     /// opposite sides.
+    #[inline(always)]
     fn crossing(&self, from: &Vertex, to: &Vertex, [df, dt]: [f64; 2], axis: usize, position: f64) -> Vertex {
         let s = df / (df - dt);
         // An edge nearly parallel to the plane crosses it wherever its ends' errors let it.
-        let slack = (from.error[axis].max(to.error[axis]) / (df - dt).abs()).min(1.0);
-        let crosses = df.abs() >= from.error[axis] && dt.abs() >= to.error[axis];
-        let mut point = Vertex { certain: from.certain && to.certain && crosses, ..NOWHERE };
-        for i in 0..3 {
+        let (error_from, error_to) = (from.error[axis], to.error[axis]);
+        let error = greater(error_from, error_to);
+        let slack = if error > 0.0 { lesser(error / (df - dt).abs(), 1.0) } else { 0.0 };
+        let mut point = NOWHERE;
+        for i in 0..4 {
             let (a, b) = (from.at[i], to.at[i]);
-            point.error[i] = from.error[i].max(to.error[i]);
-            if i == axis {
-                (point.at[i], point.error[i]) = (position, 0.0);
-            } else if a == b {
-                point.at[i] = a;
-            } else {
-                point.at[i] = (a + (b - a) * s).clamp(a.min(b), a.max(b));
-                point.error[i] += self.step_error[i] + (b - a).abs() * slack;
-            }
+            let way = b - a;
+            point.at[i] = greater(lesser(a + way * s, greater(a, b)), lesser(a, b));
+            let step = self.step_error[i] + way.abs() * slack;
+            // What both ends have in common is not interpolated.
+            let step = if way == 0.0 { 0.0 } else { step };
+            point.error[i] = greater(from.error[i], to.error[i]) + step;
         }
+        (point.at[axis], point.error[axis]) = (position, 0.0);
+        let crosses = (df.abs() >= error_from) & (dt.abs() >= error_to);
+        point.error[3] += if crosses { 0.0 } else { 1.0 };
         point
     }
+}
+
+/// The lesser of two numbers, neither NaN: one instruction, where `f64::min` is several.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers, neither NaN.
+#[inline(always)]
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Bounds in the making.
 #[derive(Clone, Copy)]
 struct Range {
-    low: [f64; 3],
-    high: [f64; 3],
+    low: [f64; 4],
+    high: [f64; 4],
 }
 
 impl Range {
-    const EMPTY: Self = Self { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
+    const EMPTY: Self = Self { low: [f64::INFINITY; 4], high: [f64::NEG_INFINITY; 4] };
 
     /// Takes in a vertex and its error.
-    #[inline]
+    #[inline(always)]
     fn grow(&mut self, vertex: &Vertex) {
-        for axis in 0..3 {
-            // Not `f64::min`: nothing here is NaN, and this is one instruction.
-            let (low, high) = (vertex.at[axis] - vertex.error[axis], vertex.at[axis] + vertex.error[axis]);
-            self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
-            self.high[axis] = if high > self.high[axis] { high } else { self.high[axis] };
+        for i in 0..4 {
+            self.low[i] = lesser(vertex.at[i] - vertex.error[i], self.low[i]);
+            self.high[i] = greater(vertex.at[i] + vertex.error[i], self.high[i]);
         }
     }
 
-    /// The least box of floats around it.
-    fn rounded(&self) -> Aabb {
+    /// The least box of floats around its part inside a box; `None` where that is empty.
+    #[inline(always)]
+    fn within(&self, within: &Aabb) -> Option<Aabb> {
+        if self.low[0] > self.high[0] {
+            return None;
+        }
         let mut bounds = Aabb::EMPTY;
         for axis in 0..3 {
-            bounds.min[axis] = round_down(self.low[axis]);
-            bounds.max[axis] = round_up(self.high[axis]);
+            // Faces are floats already.
+            let (low, high) = (self.low[axis], self.high[axis]);
+            let (least, greatest) = (within.min[axis], within.max[axis]);
+            bounds.min[axis] = if low <= f64::from(least) { least } else { round_down(low) };
+            bounds.max[axis] = if high >= f64::from(greatest) { greatest } else { round_up(high) };
         }
-        bounds
+        (!bounds.is_empty()).then_some(bounds)
     }
 }
 
@@ -225,6 +261,7 @@ impl Clipper {
     /// The bounds of the part of a triangle inside a box on each side of a plane across it: below, and
     /// above. Each lies inside its half of the box; `None` where the triangle shares no point with that
     /// half. Faces and the plane belong to what they bound.
+    #[inline(always)]
     pub fn halves(
         &mut self,
         corners: &Corners,
@@ -232,26 +269,22 @@ impl Clipper {
         axis: usize,
         position: f32,
     ) -> [Option<Aabb>; 2] {
-        let [polygon, spare] = &mut self.polygons;
+        let [mut polygon, mut spare] = self.polygons.each_mut();
         polygon.start(corners);
         for axis in 0..3 {
             for (face, below) in [(within.min[axis], false), (within.max[axis], true)] {
                 if polygon.reaches_beyond(axis, face, below) {
                     polygon.cut(axis, face, below, spare);
-                    std::mem::swap(polygon, spare);
+                    std::mem::swap(&mut polygon, &mut spare);
                     if polygon.is_empty() {
                         return [None; 2];
                     }
                 }
             }
         }
-        let mut parts =
-            polygon.bounds_of_halves(axis, position).into_iter().zip(within.halves(axis, position));
-        [0, 1].map(|_| {
-            let (part, half) = parts.next()?;
-            let part = Aabb { min: part.min.max(half.min), max: part.max.min(half.max) };
-            (!part.is_empty()).then_some(part)
-        })
+        let [below, above] = polygon.bounds_of_halves(axis, position);
+        let [half_below, half_above] = within.halves(axis, position);
+        [below.within(&half_below), above.within(&half_above)]
     }
 }
 

@@ -38,6 +38,7 @@ impl<'a> CellCost<'a> {
     }
 
     /// What a leaf of `count` triangles costs.
+    #[inline]
     pub fn leaf(&self, count: usize) -> f64 {
         f64::from(self.params.intersection_cost) * count as f64
     }
@@ -61,6 +62,7 @@ impl<'a> CellCost<'a> {
     }
 
     /// Prepares the planes across one axis.
+    #[inline]
     pub fn axis(&self, axis: usize) -> AxisCost {
         let low = f64::from(self.cell.min[axis]);
         let high = f64::from(self.cell.max[axis]);

@@ -9,7 +9,7 @@ use super::exact::Event;
 use super::partition::Divider;
 use super::reference::Reference;
 use super::subtree::{self, Subtree};
-use super::{Built, Context, Place};
+use super::{Built, Context, Place, Verdict};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::node::Node;
@@ -57,14 +57,12 @@ pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
     }
     let split = context.may_split(count, &place).and_then(|costs| {
         let split = best_split(context, &chunks, count, &costs)?;
-        let verdict = context.judge(&split, count, &place, &costs)?;
-        Some((split, verdict))
+        (split.cost < costs.leaf(count)).then_some(split)
     });
-    let Some((split, verdict)) = split else { return leaf(context, &chunks, &place) };
-    // A leaf of triangles that were cut in vain has them twice: keep the ids.
+    let Some(split) = split else { return leaf(context, &chunks, &place) };
     let parts = divide(context, chunks, &split);
     let counts = [0, 1].map(|side: usize| parts[side].iter().map(Vec::len).sum::<usize>());
-    let Some([place_below, place_above]) = place.children(&split, &verdict, counts, count) else {
+    let Some([place_below, place_above]) = place.children(&split, &Verdict::Good, counts, count) else {
         return leaf(context, &parts.concat(), &place);
     };
     let [below, above] = parts;
@@ -124,7 +122,7 @@ fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost
 /// The references below a plane and above.
 fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
     let divided = |divider: &mut Divider, mut chunk: Vec<Reference>| {
-        let below = divider.divide(&mut chunk, 0, context.triangles, split).to_vec();
+        let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split).to_vec();
         [below, chunk]
     };
     let parts: Vec<[Vec<Reference>; 2]> =

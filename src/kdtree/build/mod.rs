@@ -24,6 +24,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::simd::Chosen;
+use reference::Reference;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How far a build has come: triangles that have reached a leaf, out of all. For progress bars;
@@ -119,14 +120,31 @@ impl Context<'_> {
     }
 
     /// Whether a split is better than a leaf, or may be tried all the same.
-    fn judge(&self, split: &Split, count: usize, place: &Place, costs: &CellCost) -> Option<Verdict> {
-        let leaf_cost = costs.leaf(count);
+    fn judge(
+        &self,
+        split: &Split,
+        references: &[Reference],
+        place: &Place,
+        costs: &CellCost,
+    ) -> Option<Verdict> {
+        let leaf_cost = costs.leaf(references.len());
         if split.cost < leaf_cost {
             return Some(Verdict::Good);
         }
         let in_a_row = place.bad_splits + 1;
-        let hopeless = split.cost > 1.25 * leaf_cost + f64::from(self.params.traversal_cost);
-        (in_a_row <= self.params.bad_splits && !hopeless).then_some(Verdict::Tried(in_a_row))
+        if in_a_row > self.params.bad_splits {
+            return None;
+        }
+        // A child that is split in turn costs a step at least: what can the two cost together?
+        let step = f64::from(self.params.traversal_cost);
+        let (mut below, mut above) = (0, 0);
+        for reference in references {
+            below += usize::from(reference.min(split.axis) < split.position);
+            above += usize::from(reference.max(split.axis) > split.position);
+        }
+        let least = [below, above].map(|count| costs.leaf(count).min(step));
+        let hopeful = costs.of_children(split.axis, split.position, least) < leaf_cost;
+        hopeful.then_some(Verdict::Tried(in_a_row))
     }
 
     /// What a leaf costs.

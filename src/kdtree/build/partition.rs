@@ -4,6 +4,7 @@ use super::reference::Reference;
 use crate::geometry::clip::Clipper;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::sah::Split;
+use crate::simd::{Chosen, Simd, Task};
 
 /// Memory that dividing reuses.
 #[derive(Default)]
@@ -23,19 +24,45 @@ impl Divider {
     /// shape does not reach (its bounds had overstated it).
     pub fn divide(
         &mut self,
+        isa: Chosen,
         references: &mut Vec<Reference>,
         start: usize,
         triangles: &[Triangle],
         split: &Split,
     ) -> &[Reference] {
-        let (axis, position) = (split.axis, split.position);
         let count = references.len() - start;
         if self.below.len() < count {
             self.below.resize(count, Reference::NONE);
         }
         let (list, below) = (&mut references[start..], &mut self.below[..count]);
+        let (stay, go) = isa.run(Division { list, below, triangles, split, clipper: &mut self.clipper });
+        references.truncate(start + stay);
+        &self.below[..go]
+    }
+}
+
+/// A pass over a node's references; what stays moves to the front of `list`, what goes is written to
+/// the front of `below`, which is as long.
+struct Division<'a> {
+    list: &'a mut [Reference],
+    below: &'a mut [Reference],
+    triangles: &'a [Triangle],
+    split: &'a Split,
+    clipper: &'a mut Clipper,
+}
+
+impl Task for Division<'_> {
+    /// How many stay, and how many go.
+    type Output = (usize, usize);
+
+    // Nothing here is a vector by name: the clipper's loops over four coordinates become vectors of the
+    // instruction set.
+    #[inline(always)]
+    fn run<S: Simd>(self) -> (usize, usize) {
+        let Self { list, below, triangles, split, clipper } = self;
+        let (axis, position) = (split.axis, split.position);
         let (mut stay, mut go) = (0, 0);
-        for i in 0..count {
+        for i in 0..list.len() {
             let reference = list[i];
             let is_below = reference.max(axis) <= position;
             let is_above = reference.min(axis) >= position;
@@ -50,7 +77,7 @@ impl Divider {
             } else {
                 let primitive = reference.primitive();
                 let corners = &triangles[primitive as usize].corners;
-                let parts = self.clipper.halves(corners, &reference.bounds(), axis, position);
+                let parts = clipper.halves(corners, &reference.bounds(), axis, position);
                 // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
                 let lost = parts == [None; 2];
                 let whole = lost.then(|| reference.bounds());
@@ -65,7 +92,6 @@ impl Divider {
                 }
             }
         }
-        references.truncate(start + stay);
-        &self.below[..go]
+        (stay, go)
     }
 }

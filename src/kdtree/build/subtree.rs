@@ -95,10 +95,11 @@ impl Builder<'_> {
         let Some(split) = self.scratch.best_split(context, &self.stack[start..], &costs) else {
             return self.leaf(start);
         };
-        let Some(verdict) = context.judge(&split, count, &place, &costs) else { return self.leaf(start) };
+        let Some(verdict) = context.judge(&split, &self.stack[start..], &place, &costs) else {
+            return self.leaf(start);
+        };
 
-        // The list as it was, should the split turn out to be too dear.
-        let below = self.divider.divide(&mut self.stack, start, context.triangles, &split);
+        let below = self.divider.divide(context.isa, &mut self.stack, start, context.triangles, &split);
         let middle = self.stack.len();
         let Some([place_below, place_above]) =
             place.children(&split, &verdict, [below.len(), middle - start], count)
