@@ -123,6 +123,7 @@ fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost
 fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
     let divided = |divider: &mut Divider, mut chunk: Vec<Reference>| {
         let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split).to_vec();
+        chunk.shrink_to_fit();
         [below, chunk]
     };
     let parts: Vec<[Vec<Reference>; 2]> =

@@ -11,6 +11,7 @@ use super::partition::Divider;
 use super::reference::Reference;
 use super::{Context, Place, Verdict};
 use crate::kdtree::node::Node;
+use crate::kdtree::pages::sort_and_dedup;
 use crate::kdtree::sah::{CellCost, Split};
 
 /// A subtree whose indices count from its own arrays' beginnings.
@@ -139,15 +140,7 @@ impl Builder<'_> {
 
     /// One leaf in place of those whose references begin at `first`.
     fn merged(&mut self, first: usize) -> (Node, f64) {
-        self.references[first..].sort_unstable();
-        let mut kept = first;
-        for i in first..self.references.len() {
-            if i == first || self.references[i] != self.references[kept - 1] {
-                self.references[kept] = self.references[i];
-                kept += 1;
-            }
-        }
-        self.references.truncate(kept);
+        sort_and_dedup(&mut self.references, first);
         self.leaf_of(first)
     }
 
