@@ -81,16 +81,8 @@ impl KdTree {
     /// uses is not finite, or a parameter makes no sense.
     pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
         params.check()?;
-        let mut triangles = gather(mesh)?;
-        let bounds =
-            |triangles: &[Corners]| Aabb::of_points(triangles.iter().flatten().map(|&corner| corner.into()));
-        let scale = Scale::of_bounds(&bounds(&triangles));
-        if !scale.is_none() {
-            triangles.iter_mut().for_each(|corners| *corners = scale.apply(corners));
-        }
-        let bounds = bounds(&triangles);
+        let (triangles, bounds, scale) = gather(mesh)?;
         let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
-        let triangles = triangles.into_par_iter().map(Triangle::new).collect();
         let pages = pages::Pages::cut(&nodes, &references, params.page);
         Ok(Self { nodes, references, pages, triangles, bounds, scale, params: params.clone() })
     }
@@ -113,8 +105,8 @@ impl KdTree {
     }
 }
 
-/// Every triangle's corners, checked.
-fn gather(mesh: &Mesh) -> Result<Vec<Corners>> {
+/// Every triangle's record, checked; the box around them; and what their coordinates were multiplied by.
+fn gather(mesh: &Mesh) -> Result<(Vec<Triangle>, Aabb, Scale)> {
     if mesh.triangles.is_empty() {
         return Err(Error::Mesh("it has no triangles".into()));
     }
@@ -124,25 +116,40 @@ fn gather(mesh: &Mesh) -> Result<Vec<Corners>> {
             mesh.triangles.len()
         )));
     }
-    (0..)
-        .zip(&mesh.triangles)
-        .map(|(primitive, indices): (u32, _)| {
-            let mut corners: Corners = [[0.0; 3]; 3];
-            for (corner, &index) in corners.iter_mut().zip(indices) {
-                let Some(position) = mesh.positions.get(index as usize) else {
-                    let count = mesh.positions.len();
-                    return Err(Error::Mesh(format!(
-                        "triangle {primitive} names vertex {index}, but there are only {count} vertices"
-                    )));
-                };
-                if !position.is_finite() {
-                    return Err(Error::Mesh(format!("vertex {index} of triangle {primitive} is not finite")));
-                }
-                *corner = position.to_array();
+    let corners = |(primitive, indices): (usize, &[u32; 3])| -> Result<Corners> {
+        let mut corners: Corners = [[0.0; 3]; 3];
+        for (corner, &index) in corners.iter_mut().zip(indices) {
+            let Some(position) = mesh.positions.get(index as usize) else {
+                let count = mesh.positions.len();
+                return Err(Error::Mesh(format!(
+                    "triangle {primitive} names vertex {index}, but there are only {count} vertices"
+                )));
+            };
+            if !position.is_finite() {
+                return Err(Error::Mesh(format!("vertex {index} of triangle {primitive} is not finite")));
             }
-            Ok(corners)
-        })
-        .collect()
+            *corner = position.to_array();
+        }
+        Ok(corners)
+    };
+    let all = || mesh.triangles.par_iter().enumerate().map(corners);
+    let bounds_of = |corners: &Corners| Aabb::of_points(corners.map(Into::into));
+    let grown = |bounds: Aabb, corners: Result<Corners>| Ok(bounds.union(bounds_of(&corners?)));
+    let bounds = all().try_fold(|| Aabb::EMPTY, grown).try_reduce(|| Aabb::EMPTY, |a, b| Ok(a.union(b)));
+    // Whichever fault is met first, the first one is named.
+    let bounds = bounds.map_err(|error| all().find_map_first(Result::err).unwrap_or(error))?;
+    let scale = Scale::of_bounds(&bounds);
+    let record = |indices: &[u32; 3]| {
+        let corners = indices.map(|index| mesh.positions[index as usize].to_array());
+        Triangle::new(if scale.is_none() { corners } else { scale.apply(&corners) })
+    };
+    let triangles: Vec<Triangle> = mesh.triangles.par_iter().map(record).collect();
+    let bounds = if scale.is_none() {
+        bounds
+    } else {
+        triangles.par_iter().map(|triangle| bounds_of(&triangle.corners)).reduce(|| Aabb::EMPTY, Aabb::union)
+    };
+    Ok((triangles, bounds, scale))
 }
 
 impl Tree for KdTree {

@@ -14,6 +14,10 @@
 //! ```
 
 use super::node::Node;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Upper nodes and pages.
 #[derive(Debug, Default)]
@@ -26,37 +30,29 @@ pub(super) struct Pages {
     pub primitives: Vec<u32>,
 }
 
-/// A page in the making: its root's index in the full tree, and its primitives.
-type Page = (usize, Vec<u32>);
-
 impl Pages {
     /// Cuts a tree into the largest subtrees of at most `limit` triangles. A leaf with more is a page
-    /// of its own.
+    /// of its own. The references are those of the leaves in the order of a depth-first walk.
     pub fn cut(nodes: &[Node], references: &[u32], limit: usize) -> Self {
-        let cutter = Cutter { nodes, references, limit };
-        let (whole, mut found) = cutter.find(0, 0);
-        found.extend(whole.map(|primitives| (0, primitives)));
+        let fits = (0..nodes.len()).map(|_| AtomicBool::new(false)).collect();
+        let cutter = Cutter { nodes, references, limit, fits };
+        cutter.find(0, 0, &mut Vec::new());
 
-        // Both walks meet the pages in the same order.
         let mut pages = Self { upper: vec![Node::leaf(0, 0); 2], ..Self::default() };
         pages.beneath = pages.upper.clone();
-        pages.place(nodes, 0, 0, &mut found.into_iter().peekable());
+        let mut roots = Vec::new();
+        pages.place(&cutter, 0, 0, &mut roots);
+        pages.fill(&cutter, &roots);
         pages
     }
 
-    /// Puts the node `index` of the full tree to the upper place `at`, and what is below it behind.
-    fn place(
-        &mut self,
-        nodes: &[Node],
-        index: usize,
-        at: usize,
-        pages: &mut std::iter::Peekable<std::vec::IntoIter<Page>>,
-    ) {
-        let node = nodes[index];
+    /// Puts the node `index` of the full tree to the upper place `at`, and what is below it behind; the
+    /// places of pages, which stay empty, go to `roots`.
+    fn place(&mut self, cutter: &Cutter, index: usize, at: usize, roots: &mut Vec<usize>) {
+        let node = cutter.nodes[index];
         self.beneath[at] = node;
-        if let Some((_, primitives)) = pages.next_if(|&(root, _)| root == index) {
-            self.upper[at] = Node::leaf(self.primitives.len(), primitives.len());
-            self.primitives.extend(primitives);
+        if cutter.fits[index].load(Relaxed) {
+            roots.push(at);
             return;
         }
         let pair = self.upper.len();
@@ -64,7 +60,32 @@ impl Pages {
         self.beneath.extend([Node::leaf(0, 0); 2]);
         self.upper[at] = Node::inner(node.axis(), node.split(), pair);
         for child in 0..2 {
-            self.place(nodes, node.below() as usize + child, pair + child, pages);
+            self.place(cutter, node.below() as usize + child, pair + child, roots);
+        }
+    }
+
+    /// Lists every page's triangles.
+    fn fill(&mut self, cutter: &Cutter, roots: &[usize]) {
+        let beneath = &self.beneath;
+        let list = |places: &[usize]| {
+            let (mut primitives, mut counts) = (Vec::new(), Vec::with_capacity(places.len()));
+            for &at in places {
+                let first = primitives.len();
+                primitives.extend_from_slice(&cutter.references[cutter.references_below(beneath[at])]);
+                sort_and_dedup(&mut primitives, first);
+                counts.push(primitives.len() - first);
+            }
+            (primitives, counts)
+        };
+        let lists: Vec<(Vec<u32>, Vec<usize>)> = roots.par_chunks(PAGES_PER_TASK).map(list).collect();
+        self.primitives.reserve_exact(lists.iter().map(|(primitives, _)| primitives.len()).sum());
+        for (places, (primitives, counts)) in roots.chunks(PAGES_PER_TASK).zip(lists) {
+            let mut first = self.primitives.len();
+            for (&at, count) in places.iter().zip(counts) {
+                self.upper[at] = Node::leaf(first, count);
+                first += count;
+            }
+            self.primitives.extend(primitives);
         }
     }
 
@@ -74,60 +95,80 @@ impl Pages {
     }
 }
 
+/// Finds out which subtrees can be part of a page.
 struct Cutter<'a> {
     nodes: &'a [Node],
     references: &'a [u32],
     limit: usize,
+    /// By node.
+    fits: Vec<AtomicBool>,
 }
 
 impl Cutter<'_> {
-    /// The primitives of a subtree if it can be part of a page; and the pages in it that are settled, in
-    /// the order of a depth-first walk.
-    fn find(&self, index: usize, depth: usize) -> (Option<Vec<u32>>, Vec<Page>) {
+    /// The references of a subtree if it can be part of a page.
+    fn find(&self, index: usize, depth: usize, scratch: &mut Vec<u32>) -> Option<Range<usize>> {
         let node = self.nodes[index];
-        if node.is_leaf() {
-            let mut primitives = self.references[node.references()].to_vec();
-            primitives.sort_unstable();
-            return (Some(primitives), Vec::new());
-        }
-        let below = node.below() as usize;
-        let ((lower, mut pages), (upper, later)) = if depth < PARALLEL_DEPTH {
-            rayon::join(|| self.find(below, depth + 1), || self.find(below + 1, depth + 1))
+        let range = if node.is_leaf() {
+            node.references()
         } else {
-            (self.find(below, depth + 1), self.find(below + 1, depth + 1))
+            let below = node.below() as usize;
+            let (lower, upper) = if depth < PARALLEL_DEPTH {
+                rayon::join(
+                    || self.find(below, depth + 1, &mut Vec::new()),
+                    || self.find(below + 1, depth + 1, &mut Vec::new()),
+                )
+            } else {
+                (self.find(below, depth + 1, scratch), self.find(below + 1, depth + 1, scratch))
+            };
+            let range = lower?.start..upper?.end;
+            self.is_page(&range, scratch).then_some(range)?
         };
-        if let (Some(lower), Some(upper)) = (&lower, &upper)
-            && let Some(both) = self.union(lower, upper)
-        {
-            return (Some(both), pages);
-        }
-        pages.extend(lower.map(|primitives| (below, primitives)));
-        pages.extend(later);
-        pages.extend(upper.map(|primitives| (below + 1, primitives)));
-        (None, pages)
+        self.fits[index].store(true, Relaxed);
+        Some(range)
     }
 
-    /// Two ascending lists as one, unless that is longer than a page may be.
-    fn union(&self, a: &[u32], b: &[u32]) -> Option<Vec<u32>> {
-        if a.len().max(b.len()) > self.limit {
-            return None;
+    /// Whether there are not too many different triangles in some leaves in a row.
+    fn is_page(&self, range: &Range<usize>, scratch: &mut Vec<u32>) -> bool {
+        if range.len() <= self.limit {
+            return true;
         }
-        let mut union = Vec::with_capacity(a.len() + b.len());
-        let (mut a, mut b) = (a.iter().copied().peekable(), b.iter().copied().peekable());
-        while let Some(next) = a.peek().into_iter().chain(b.peek()).copied().min() {
-            a.next_if_eq(&next);
-            b.next_if_eq(&next);
-            union.push(next);
-            if union.len() > self.limit {
-                return None;
-            }
-        }
-        Some(union)
+        scratch.clear();
+        scratch.extend_from_slice(&self.references[range.clone()]);
+        sort_and_dedup(scratch, 0);
+        scratch.len() <= self.limit
     }
+
+    /// The references of all leaves below a node.
+    fn references_below(&self, node: Node) -> Range<usize> {
+        let (mut first, mut last) = (node, node);
+        while !first.is_leaf() {
+            first = self.nodes[first.below() as usize];
+        }
+        while !last.is_leaf() {
+            last = self.nodes[last.below() as usize + 1];
+        }
+        first.references().start..last.references().end
+    }
+}
+
+/// Sorts what a list has from `first` on, and drops what is there twice.
+pub(super) fn sort_and_dedup(list: &mut Vec<u32>, first: usize) {
+    list[first..].sort_unstable();
+    let mut kept = first;
+    for i in first..list.len() {
+        if i == first || list[i] != list[kept - 1] {
+            list[kept] = list[i];
+            kept += 1;
+        }
+    }
+    list.truncate(kept);
 }
 
 /// Subtrees so far down are cut side by side.
 const PARALLEL_DEPTH: usize = 6;
+
+/// Pages that a task lists.
+const PAGES_PER_TASK: usize = 512;
 
 #[cfg(test)]
 mod tests {

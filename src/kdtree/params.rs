@@ -41,14 +41,14 @@ pub struct BuildParams {
 impl Default for BuildParams {
     fn default() -> Self {
         Self {
-            traversal_cost: 8.0,
+            traversal_cost: 3.0,
             intersection_cost: 1.0,
             empty_bonus: 0.2,
             min_leaf: 2,
-            bad_splits: 2,
+            bad_splits: 1,
             max_depth: 0,
-            bins: 64,
-            exact_below: 1024,
+            bins: 32,
+            exact_below: 32,
             max_duplication: 12.0,
             page: 64,
         }

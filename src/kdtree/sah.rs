@@ -5,6 +5,7 @@
 
 use super::params::BuildParams;
 use crate::geometry::Aabb;
+use crate::simd::Lanes;
 
 /// An axis-aligned plane that divides a cell, and the side on which triangles that lie in the
 /// plane go.
@@ -37,11 +38,31 @@ impl<'a> CellCost<'a> {
     }
 
     /// What a leaf of `count` triangles costs.
+    #[inline]
     pub fn leaf(&self, count: usize) -> f64 {
         f64::from(self.params.intersection_cost) * count as f64
     }
 
+    /// Whether planes across an axis could divide anything.
+    #[inline(always)]
+    pub fn has_extent(&self, axis: usize) -> bool {
+        self.cell.min[axis] < self.cell.max[axis]
+    }
+
+    /// The cell's faces along an axis.
+    #[inline(always)]
+    pub fn range(&self, axis: usize) -> (f32, f32) {
+        (self.cell.min[axis], self.cell.max[axis])
+    }
+
+    /// What a split costs by what its children are known to cost.
+    pub fn of_children(&self, axis: usize, position: f32, [below, above]: [f64; 2]) -> f64 {
+        let [p_below, p_above] = self.axis(axis).probabilities(position);
+        f64::from(self.params.traversal_cost) + p_below * below + p_above * above
+    }
+
     /// Prepares the planes across one axis.
+    #[inline]
     pub fn axis(&self, axis: usize) -> AxisCost {
         let low = f64::from(self.cell.min[axis]);
         let high = f64::from(self.cell.max[axis]);
@@ -77,6 +98,27 @@ pub struct AxisCost {
 }
 
 impl AxisCost {
+    /// How likely a ray that meets the cell meets the parts below and above a plane.
+    #[inline]
+    fn probabilities(&self, position: f32) -> [f64; 2] {
+        let x = f64::from(position);
+        [self.cap + self.wall * (x - self.low), self.cap + self.wall * (self.high - x)]
+    }
+
+    /// The same model in single precision, for many planes at once.
+    pub fn lanes(&self) -> LaneCost {
+        let length = self.high - self.low;
+        LaneCost {
+            low: self.low as f32,
+            high: self.high as f32,
+            length: length as f32,
+            cap: (self.cap * self.intersection) as f32,
+            side: (self.wall * length * self.intersection) as f32,
+            traversal: self.traversal as f32,
+            kept: self.kept as f32,
+        }
+    }
+
     /// The cost of a plane with `below` and `above` triangles on its sides, or infinity if the
     /// plane divides nothing.
     #[inline]
@@ -87,8 +129,7 @@ impl AxisCost {
         if (flat_below || flat_above) && (below == 0 || above == 0) {
             return f64::INFINITY;
         }
-        let p_below = self.cap + self.wall * (x - self.low);
-        let p_above = self.cap + self.wall * (self.high - x);
+        let [p_below, p_above] = self.probabilities(position);
         let cost = self.traversal + self.intersection * (p_below * below as f64 + p_above * above as f64);
         if below == 0 || above == 0 { cost * self.kept } else { cost }
     }
@@ -100,6 +141,36 @@ impl AxisCost {
         let with_above = if planar == 0 { with_below } else { self.cost(position, below, above + planar) };
         let planar_below = with_below <= with_above;
         Split { axis: self.axis, position, planar_below, cost: with_below.min(with_above) }
+    }
+}
+
+/// [`AxisCost`] for vectors of planes.
+#[derive(Clone, Copy, Debug)]
+pub struct LaneCost {
+    low: f32,
+    high: f32,
+    length: f32,
+    /// What a triangle costs that only the ends' area counts for, and what all the walls add.
+    cap: f32,
+    side: f32,
+    traversal: f32,
+    kept: f32,
+}
+
+impl LaneCost {
+    /// The costs of planes inside or in the faces of the cell with so many triangles on their sides, or
+    /// infinity where nothing is divided.
+    #[inline(always)]
+    pub fn of<const W: usize, L: Lanes<W>>(&self, plane: L, below: L, above: L) -> L {
+        let (cap, side, zero) = (L::splat(self.cap), L::splat(self.side), L::splat(0.0));
+        let (low, high, length) = (L::splat(self.low), L::splat(self.high), L::splat(self.length));
+        let costs_below = (cap + side * ((plane - low) / length)) * below;
+        let costs_above = (cap + side * ((high - plane) / length)) * above;
+        let cost = L::splat(self.traversal) + (costs_below + costs_above);
+        let none = below.le(zero) | above.le(zero);
+        let in_face = plane.le(low) | high.le(plane);
+        let cost = L::select(none, cost * L::splat(self.kept), cost);
+        L::select(none & in_face, L::splat(f32::INFINITY), cost)
     }
 }
 

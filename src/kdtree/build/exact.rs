@@ -1,7 +1,6 @@
 //! The exact sweep: every end of a clipped bound is tried as a split plane (Wald & Havran 2006).
 
-use super::Reference;
-use crate::geometry::Aabb;
+use super::reference::Reference;
 use crate::kdtree::sah::{AxisCost, CellCost, Split, cheaper};
 
 /// Where a triangle's part begins, ends, or lies flat along the swept axis.
@@ -9,7 +8,7 @@ use crate::kdtree::sah::{AxisCost, CellCost, Split, cheaper};
 /// One integer, ordered by position first (sign and magnitude mapped to unsigned order) and then
 /// ends before flat ones before beginnings, so that a plane's counts are complete when it is priced.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Event(u64);
+pub struct Event(u64);
 
 const END: u64 = 0;
 const PLANAR: u64 = 1;
@@ -21,6 +20,24 @@ impl Event {
         let bits = (position + 0.0).to_bits();
         let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
         Self(u64::from(ordered) << 2 | kind)
+    }
+
+    /// Adds the events of a part from `low` to `high`, those that are asked for. A flat part's one event
+    /// is asked for with `low`.
+    #[inline(always)]
+    pub fn push(low: f32, high: f32, with_low: bool, with_high: bool, events: &mut Vec<Self>) {
+        if low == high {
+            if with_low {
+                events.push(Self::new(low, PLANAR));
+            }
+            return;
+        }
+        if with_low {
+            events.push(Self::new(low, START));
+        }
+        if with_high {
+            events.push(Self::new(high, END));
+        }
     }
 
     fn kind(self) -> usize {
@@ -38,73 +55,29 @@ impl Event {
     }
 }
 
-/// Memory that sweeps reuse.
-#[derive(Default)]
-pub(super) struct Scratch {
-    events: Vec<Event>,
-}
-
 /// The cheapest plane of a cell, all axes and all ends of bounds tried; `None` if none divides.
-pub(super) fn best_split(
-    references: &[Reference],
-    cell: &Aabb,
-    costs: &CellCost,
-    scratch: &mut Scratch,
-) -> Option<Split> {
+pub fn best_split(references: &[Reference], costs: &CellCost, events: &mut Vec<Event>) -> Option<Split> {
     let mut best = None;
-    for axis in 0..3 {
-        if cell.min[axis] < cell.max[axis] {
-            let everything =
-                Window { low: f32::NEG_INFINITY, high: f32::INFINITY, below: 0, above: references.len() };
-            best = sweep(references, axis, &costs.axis(axis), everything, best, scratch);
+    for axis in (0..3).filter(|&axis| costs.has_extent(axis)) {
+        events.clear();
+        for reference in references {
+            Event::push(reference.min(axis), reference.max(axis), true, true, events);
         }
+        events.sort_unstable();
+        best = price(events, &costs.axis(axis), 0, references.len(), best);
     }
     best
 }
 
-/// A stretch of an axis, and what lies beyond it on both sides.
-#[derive(Clone, Copy)]
-pub(super) struct Window {
-    /// Planes at or below this are not tried.
-    pub low: f32,
-    /// Planes above this are not tried.
-    pub high: f32,
-    /// References that begin, or lie flat, at or below `low`.
-    pub below: usize,
-    /// References that end, or lie flat, above `low`.
-    pub above: usize,
-}
-
-/// Tries the ends that fall into a window of one axis; gives the cheapest split found, or `best`.
-pub(super) fn sweep(
-    references: &[Reference],
-    axis: usize,
+/// The cheapest of the planes at some sorted events, or `best`. Before the first event, `below`
+/// references have begun or lain flat, and `above` have not ended.
+pub fn price(
+    events: &[Event],
     cost: &AxisCost,
-    window: Window,
+    mut below: usize,
+    mut above: usize,
     mut best: Option<Split>,
-    scratch: &mut Scratch,
 ) -> Option<Split> {
-    let inside = |x: f32| window.low < x && x <= window.high;
-    let events = &mut scratch.events;
-    events.clear();
-    for reference in references {
-        let (low, high) = (reference.min[axis], reference.max[axis]);
-        if low == high {
-            if inside(low) {
-                events.push(Event::new(low, PLANAR));
-            }
-        } else {
-            if inside(low) {
-                events.push(Event::new(low, START));
-            }
-            if inside(high) {
-                events.push(Event::new(high, END));
-            }
-        }
-    }
-    events.sort_unstable();
-
-    let (mut below, mut above) = (window.below, window.above);
     let mut next = 0;
     while let Some(&first) = events.get(next) {
         // Count what ends, lies flat and begins in this plane.

@@ -1,46 +1,97 @@
 //! Dividing references by a plane, with those that cross it clipped to each side.
 
-use super::Reference;
-use crate::geometry::clip::clipped_bounds;
-use crate::geometry::triangle::Corners;
+use super::reference::Reference;
+use crate::geometry::clip::Clipper;
+use crate::geometry::triangle::Triangle;
 use crate::kdtree::sah::Split;
+use crate::simd::{Chosen, Simd, Task};
 
-/// References on the two sides of a plane.
-pub(super) struct Parts {
-    pub below: Vec<Reference>,
-    pub above: Vec<Reference>,
+/// Memory that dividing reuses.
+#[derive(Default)]
+pub struct Divider {
+    clipper: Clipper,
+    /// What goes below the plane.
+    below: Vec<Reference>,
 }
 
-/// Every reference goes to each side that its part in the cell reaches into.
-///
-/// A triangle that only touches the plane stays on its own side; one that lies in the plane goes
-/// to the side that the split names. One that crosses is clipped to both sides, and left out of
-/// a side that its true shape does not reach (its bounds had overstated it).
-pub(super) fn partition(references: &[Reference], triangles: &[Corners], split: &Split) -> Parts {
-    let (axis, position) = (split.axis, split.position);
-    let mut below = Vec::with_capacity(references.len() / 2 + 8);
-    let mut above = Vec::with_capacity(references.len() / 2 + 8);
-    for reference in references {
-        let (low, high) = (reference.min[axis], reference.max[axis]);
-        if low == position && high == position {
-            if split.planar_below { &mut below } else { &mut above }.push(*reference);
-        } else if high <= position {
-            below.push(*reference);
-        } else if low >= position {
-            above.push(*reference);
-        } else {
-            let corners = &triangles[reference.primitive as usize];
-            let [part_below, part_above] = reference.bounds().halves(axis, position);
-            let clipped_below = clipped_bounds(corners, &part_below);
-            let clipped_above = clipped_bounds(corners, &part_above);
-            // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
-            if clipped_below.is_none() && clipped_above.is_none() {
-                below.push(*reference);
-                above.push(*reference);
-            }
-            below.extend(clipped_below.map(|b| Reference::with_bounds(reference.primitive, b)));
-            above.extend(clipped_above.map(|b| Reference::with_bounds(reference.primitive, b)));
+impl Divider {
+    /// Divides the references from `start` on. Those above the plane stay in `references`, moved
+    /// together; those below it are returned, to be copied before the next call.
+    ///
+    /// Every reference goes to each side that its part in the cell reaches into: a triangle that only
+    /// touches the plane stays on its own side, one that lies in the plane goes to the side that the
+    /// split names. One that crosses is clipped to both sides, and left out of a side that its true
+    /// shape does not reach (its bounds had overstated it).
+    pub fn divide(
+        &mut self,
+        isa: Chosen,
+        references: &mut Vec<Reference>,
+        start: usize,
+        triangles: &[Triangle],
+        split: &Split,
+    ) -> &[Reference] {
+        let count = references.len() - start;
+        if self.below.len() < count {
+            self.below.resize(count, Reference::NONE);
         }
+        let (list, below) = (&mut references[start..], &mut self.below[..count]);
+        let (stay, go) = isa.run(Division { list, below, triangles, split, clipper: &mut self.clipper });
+        references.truncate(start + stay);
+        &self.below[..go]
     }
-    Parts { below, above }
+}
+
+/// A pass over a node's references; what stays moves to the front of `list`, what goes is written to
+/// the front of `below`, which is as long.
+struct Division<'a> {
+    list: &'a mut [Reference],
+    below: &'a mut [Reference],
+    triangles: &'a [Triangle],
+    split: &'a Split,
+    clipper: &'a mut Clipper,
+}
+
+impl Task for Division<'_> {
+    /// How many stay, and how many go.
+    type Output = (usize, usize);
+
+    // Nothing here is a vector by name: the clipper's loops over four coordinates become vectors of the
+    // instruction set.
+    #[inline(always)]
+    fn run<S: Simd>(self) -> (usize, usize) {
+        let Self { list, below, triangles, split, clipper } = self;
+        let (axis, position) = (split.axis, split.position);
+        let (mut stay, mut go) = (0, 0);
+        for i in 0..list.len() {
+            let reference = list[i];
+            let is_below = reference.max(axis) <= position;
+            let is_above = reference.min(axis) >= position;
+            if is_below | is_above {
+                // Written to both lists, and kept in one: no branch to be mispredicted. `stay` is at most
+                // `i`, so that nothing is lost.
+                let goes = is_below & (!is_above | split.planar_below);
+                below[go] = reference;
+                list[stay] = reference;
+                go += usize::from(goes);
+                stay += usize::from(!goes);
+            } else {
+                let primitive = reference.primitive();
+                let corners = &triangles[primitive as usize].corners;
+                let parts = clipper.halves(corners, &reference.bounds(), axis, position);
+                // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
+                let lost = parts == [None; 2];
+                let whole = lost.then(|| reference.bounds());
+                let [part_below, part_above] = parts.map(|part| part.or(whole));
+                if let Some(bounds) = part_below {
+                    below[go] = Reference::new(primitive, &bounds);
+                    go += 1;
+                }
+                if let Some(bounds) = part_above {
+                    list[stay] = Reference::new(primitive, &bounds);
+                    stay += 1;
+                }
+            }
+        }
+        (stay, go)
+    }
 }

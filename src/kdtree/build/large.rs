@@ -1,0 +1,202 @@
+//! Large nodes: all threads count, sweep and divide them together.
+//!
+//! Their references lie in chunks of fixed size. A pass over a node is a pass over its chunks in
+//! parallel; dividing makes two lists of chunks out of one and frees what it has read, so that hardly
+//! more memory is in use than the references need.
+
+use super::binned::{self, Extent, Frame, Table};
+use super::exact::Event;
+use super::partition::Divider;
+use super::reference::Reference;
+use super::subtree::{self, Subtree};
+use super::{Built, Context, Place, Verdict};
+use crate::geometry::Aabb;
+use crate::geometry::triangle::Triangle;
+use crate::kdtree::node::Node;
+use crate::kdtree::sah::{CellCost, Split};
+use rayon::prelude::*;
+
+/// References in a chunk: half a megabyte, what a core's own cache holds.
+const CHUNK: usize = 16_384;
+
+/// A node with fewer references is one task.
+const SMALL: usize = 8192;
+
+/// Nodes with more references are worth this many times more bins: fewer ends to sort.
+const MANY: usize = 8 * CHUNK;
+const FINER: usize = 8;
+
+/// References, chunk after chunk; none is empty.
+type Chunks = Vec<Vec<Reference>>;
+
+/// The references of all triangles, whole.
+pub fn chunks_of(triangles: &[Triangle]) -> Chunks {
+    let whole = |(primitive, triangle): (u32, &Triangle)| {
+        Reference::new(primitive, &Aabb::of_points(triangle.corners.map(Into::into)))
+    };
+    let chunk = |(chunk, triangles): (usize, &[Triangle])| {
+        let first = (chunk * CHUNK) as u32;
+        (first..).zip(triangles).map(whole).collect()
+    };
+    triangles.par_chunks(CHUNK).enumerate().map(chunk).collect()
+}
+
+/// A part of the tree that is done.
+pub enum Part {
+    /// An inner node and its children, below and above.
+    Inner(Split, Box<[Part; 2]>),
+    /// All of a small subtree.
+    Whole(Subtree),
+}
+
+/// Builds a subtree, its children side by side while they are large.
+pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
+    let count = chunks.iter().map(Vec::len).sum();
+    if count < SMALL {
+        return Part::Whole(subtree::build(context, chunks.concat(), place));
+    }
+    let split = context.may_split(count, &place).and_then(|costs| {
+        let split = best_split(context, &chunks, count, &costs)?;
+        (split.cost < costs.leaf(count)).then_some(split)
+    });
+    let Some(split) = split else { return leaf(context, &chunks, &place) };
+    let parts = divide(context, chunks, &split);
+    let counts = [0, 1].map(|side: usize| parts[side].iter().map(Vec::len).sum::<usize>());
+    let Some([place_below, place_above]) = place.children(&split, &Verdict::Good, counts, count) else {
+        return leaf(context, &parts.concat(), &place);
+    };
+    let [below, above] = parts;
+    let (below, above) =
+        rayon::join(|| build(context, below, place_below), || build(context, above, place_above));
+    Part::Inner(split, Box::new([below, above]))
+}
+
+/// All in one leaf, each triangle once.
+fn leaf(context: &Context, chunks: &[Vec<Reference>], place: &Place) -> Part {
+    context.finished(place.share);
+    let mut ids: Vec<u32> = chunks.iter().flatten().map(Reference::primitive).collect();
+    ids.par_sort_unstable();
+    ids.dedup();
+    Part::Whole(Subtree::leaf(ids))
+}
+
+/// The cheapest plane found; `None` if none divides.
+fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost) -> Option<Split> {
+    let bins = context.params.bins;
+    let bins = if count > MANY { (bins * FINER).min(1024) } else { bins };
+    let extent_of = |chunk: &Vec<Reference>| {
+        let mut extent = Extent::NONE;
+        extent.grow(chunk);
+        extent
+    };
+    let extent = chunks.par_iter().map(extent_of).reduce(|| Extent::NONE, Extent::union);
+    let frame = Frame::new(&extent, bins);
+    let empty = || {
+        let mut table = Table::default();
+        table.reset(bins);
+        table
+    };
+    let counted = |mut table: Table, chunk: &Vec<Reference>| {
+        table.count(chunk, &frame);
+        table
+    };
+    let table = chunks.par_iter().fold(empty, counted).reduce(empty, |mut a, b| {
+        a.add(&b);
+        a
+    });
+    let Some(boundary) = table.best_boundary(&frame, costs, count) else {
+        return binned::ends_of_extent(&frame, costs, count);
+    };
+    let gathered = |mut events: Vec<Event>, chunk: &Vec<Reference>| {
+        boundary.gather(chunk, &frame, &mut events);
+        events
+    };
+    let mut events = chunks.par_iter().fold(Vec::new, gathered).reduce(Vec::new, |mut a, b| {
+        a.extend_from_slice(&b);
+        a
+    });
+    events.par_sort_unstable();
+    boundary.refine(&events, &frame, costs, count)
+}
+
+/// The references below a plane and above.
+fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
+    let divided = |divider: &mut Divider, mut chunk: Vec<Reference>| {
+        let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split).to_vec();
+        chunk.shrink_to_fit();
+        [below, chunk]
+    };
+    let parts: Vec<[Vec<Reference>; 2]> =
+        chunks.into_par_iter().map_init(Divider::default, divided).collect();
+    let mut sides: [Chunks; 2] = Default::default();
+    for pair in parts {
+        for (side, part) in sides.iter_mut().zip(pair) {
+            match side.last_mut() {
+                _ if part.is_empty() => {}
+                Some(last) if last.len() + part.len() <= CHUNK => last.extend_from_slice(&part),
+                _ => side.push(part),
+            }
+        }
+    }
+    sides
+}
+
+impl Part {
+    /// Its nodes, the root not counted.
+    pub fn nodes(&self) -> usize {
+        match self {
+            Self::Inner(_, children) => 2 + children.iter().map(Self::nodes).sum::<usize>(),
+            Self::Whole(subtree) => subtree.nodes.len(),
+        }
+    }
+
+    /// The references of all its leaves.
+    pub fn references(&self) -> usize {
+        match self {
+            Self::Inner(_, children) => children.iter().map(Self::references).sum(),
+            Self::Whole(subtree) => subtree.references.len(),
+        }
+    }
+
+    /// The whole tree in two arrays: the root, an unused place, so that pairs of siblings are aligned,
+    /// and then the pairs.
+    pub fn gathered(self) -> Built {
+        let mut nodes = vec![Node::leaf(0, 0); 2 + self.nodes()];
+        let mut references = vec![0; self.references()];
+        let (root, rest) = nodes.split_at_mut(2);
+        root[0] = self.place(rest, 2, &mut references, 0);
+        Built { nodes, references }
+    }
+
+    /// Writes it to slices that begin at `first_node` and `first_reference` of the whole arrays; its root.
+    fn place(
+        self,
+        nodes: &mut [Node],
+        first_node: usize,
+        references: &mut [u32],
+        first_reference: usize,
+    ) -> Node {
+        match self {
+            Self::Whole(subtree) => {
+                references.copy_from_slice(&subtree.references);
+                for (node, built) in nodes.iter_mut().zip(&subtree.nodes) {
+                    *node = built.moved(first_node, first_reference);
+                }
+                subtree.root.moved(first_node, first_reference)
+            }
+            Self::Inner(split, children) => {
+                let [below, above] = *children;
+                let (pair, rest) = nodes.split_at_mut(2);
+                let (nodes_below, nodes_above) = rest.split_at_mut(below.nodes());
+                let (ids_below, ids_above) = references.split_at_mut(below.references());
+                let (node_above, reference_above) =
+                    (first_node + 2 + nodes_below.len(), first_reference + ids_below.len());
+                (pair[0], pair[1]) = rayon::join(
+                    || below.place(nodes_below, first_node + 2, ids_below, first_reference),
+                    || above.place(nodes_above, node_above, ids_above, reference_above),
+                );
+                Node::inner(split.axis, split.position, first_node)
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Small subtrees: one thread, no allocation per node.
+//!
+//! The references of a node are the end of one stack. Dividing leaves those above the plane in their
+//! place and puts those below on top; when these have become a subtree they are popped, and the others
+//! follow.
+
+use super::binned::{self, Extent, Frame, Table};
+use super::exact::{self, Event};
+use super::few::{self, Few};
+use super::partition::Divider;
+use super::reference::Reference;
+use super::{Context, Place, Verdict};
+use crate::kdtree::node::Node;
+use crate::kdtree::pages::sort_and_dedup;
+use crate::kdtree::sah::{CellCost, Split};
+
+/// A subtree whose indices count from its own arrays' beginnings.
+pub struct Subtree {
+    pub root: Node,
+    pub nodes: Vec<Node>,
+    /// Primitive ids, leaf after leaf.
+    pub references: Vec<u32>,
+}
+
+impl Subtree {
+    pub fn leaf(references: Vec<u32>) -> Self {
+        Self { root: Node::leaf(0, references.len()), nodes: Vec::new(), references }
+    }
+}
+
+/// Builds the subtree of some references on this thread.
+pub fn build(context: &Context, references: Vec<Reference>, place: Place) -> Subtree {
+    let mut builder = Builder {
+        context,
+        stack: references,
+        nodes: Vec::new(),
+        references: Vec::new(),
+        scratch: Scratch::default(),
+        divider: Divider::default(),
+    };
+    let (root, _) = builder.node(0, place);
+    context.finished(place.share);
+    Subtree { root, nodes: builder.nodes, references: builder.references }
+}
+
+/// Memory that the search for splits reuses.
+#[derive(Default)]
+pub struct Scratch {
+    table: Table,
+    events: Vec<Event>,
+    few: Few,
+}
+
+impl Scratch {
+    /// The cheapest plane found for a small node; `None` if none divides.
+    fn best_split(&mut self, context: &Context, references: &[Reference], costs: &CellCost) -> Option<Split> {
+        let (count, params) = (references.len(), context.params);
+        if count >= params.exact_below.max(2) {
+            let mut extent = Extent::NONE;
+            extent.grow(references);
+            let frame = Frame::new(&extent, params.bins);
+            self.table.reset(params.bins);
+            self.table.count(references, &frame);
+            match self.table.best_boundary(&frame, costs, count) {
+                Some(boundary) => {
+                    self.events.clear();
+                    boundary.gather(references, &frame, &mut self.events);
+                    self.events.sort_unstable();
+                    boundary.refine(&self.events, &frame, costs, count)
+                }
+                None => binned::ends_of_extent(&frame, costs, count),
+            }
+        } else if count <= few::MOST {
+            self.few.best_split(context.isa, references, costs)
+        } else {
+            exact::best_split(references, costs, &mut self.events)
+        }
+    }
+}
+
+struct Builder<'a> {
+    context: &'a Context<'a>,
+    stack: Vec<Reference>,
+    nodes: Vec<Node>,
+    references: Vec<u32>,
+    scratch: Scratch,
+    divider: Divider,
+}
+
+impl Builder<'_> {
+    /// Builds the node of the references from `start` on and pops them; the node, and its expected cost.
+    fn node(&mut self, start: usize, place: Place) -> (Node, f64) {
+        let context = self.context;
+        let count = self.stack.len() - start;
+        let Some(costs) = context.may_split(count, &place) else { return self.leaf(start) };
+        let Some(split) = self.scratch.best_split(context, &self.stack[start..], &costs) else {
+            return self.leaf(start);
+        };
+        let Some(verdict) = context.judge(&split, &self.stack[start..], &place, &costs) else {
+            return self.leaf(start);
+        };
+
+        let below = self.divider.divide(context.isa, &mut self.stack, start, context.triangles, &split);
+        let middle = self.stack.len();
+        let Some([place_below, place_above]) =
+            place.children(&split, &verdict, [below.len(), middle - start], count)
+        else {
+            self.stack.extend_from_slice(below);
+            return self.undivided(start);
+        };
+        self.stack.extend_from_slice(below);
+
+        let (pair, first) = (self.nodes.len(), self.references.len());
+        self.nodes.extend([Node::leaf(0, 0); 2]);
+        let (node_below, cost_below) = self.node(middle, place_below);
+        let (node_above, cost_above) = self.node(start, place_above);
+        let cost = costs.of_children(split.axis, split.position, [cost_below, cost_above]);
+        if matches!(verdict, Verdict::Tried(_)) && cost >= costs.leaf(count) {
+            // What was hoped for has not come.
+            self.nodes.truncate(pair);
+            return self.merged(first);
+        }
+        (self.nodes[pair], self.nodes[pair + 1]) = (node_below, node_above);
+        (Node::inner(split.axis, split.position, pair), cost)
+    }
+
+    /// A leaf of the references from `start` on.
+    fn leaf(&mut self, start: usize) -> (Node, f64) {
+        let first = self.references.len();
+        self.references.extend(self.stack.drain(start..).map(|reference| reference.primitive()));
+        self.leaf_of(first)
+    }
+
+    /// The same, where they have been divided in vain: triangles that were cut are on the stack twice.
+    fn undivided(&mut self, start: usize) -> (Node, f64) {
+        let first = self.references.len();
+        self.leaf(start);
+        self.merged(first)
+    }
+
+    /// One leaf in place of those whose references begin at `first`.
+    fn merged(&mut self, first: usize) -> (Node, f64) {
+        sort_and_dedup(&mut self.references, first);
+        self.leaf_of(first)
+    }
+
+    fn leaf_of(&self, first: usize) -> (Node, f64) {
+        let count = self.references.len() - first;
+        (Node::leaf(first, count), self.context.leaf_cost(count))
+    }
+}
