@@ -10,9 +10,11 @@
 //! every instruction set gives the same bits, and the sign arguments of the watertight triangle
 //! test hold (a fused difference of products can have the wrong sign).
 
+mod eight;
 mod isa;
 mod lanes;
 mod portable;
+mod prefetch;
 mod scalar;
 
 #[cfg(target_arch = "x86_64")]
@@ -22,8 +24,10 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod pair;
 
+pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};
+pub use prefetch::prefetch;
 
 #[cfg(test)]
 mod tests;
