@@ -16,6 +16,7 @@ mod lanes;
 mod packet;
 mod range;
 mod stack;
+mod stream;
 mod tile;
 mod walk;
 
