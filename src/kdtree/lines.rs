@@ -20,9 +20,12 @@
 //!             31  30                                     2   1   0
 //!            +---+----------------------------------------+-------+
 //! exit       | 1 | first word of a leaf's record          | axis  |
-//!            | 0 | number of a line, 0: nothing there     | axis  |   of the plane at the same place
-//!            +---+----------------------------------------+-------+
+//!            | 0 | 0 | number of a line, 0: nothing there | axis  |   of the plane at the same place
+//!            +---+---+------------------------------------+-------+
+//!             31  30 27
 //! ```
+//!
+//! Bits 27 to 30 of an exit to a line are free for who walks: see [`Exit::without`].
 //!
 //! A leaf's record is a word of the reference array that tells how many references follow. Where the tree is
 //! less than three levels deep, planes at infinity let everything pass to the exit below them.
@@ -54,14 +57,34 @@ impl Exit {
         self.0 < 0
     }
 
-    /// The number of a line, or the first word of a leaf's record.
+    /// The first word of a leaf's record.
     #[inline(always)]
-    pub const fn index(self) -> usize {
+    pub const fn record(self) -> usize {
         ((self.0 as u32) << 1 >> 3) as usize
     }
 
-    fn of_line(index: usize) -> Self {
-        Self((index as u32) as i32 * 4)
+    /// The number of a line.
+    #[inline(always)]
+    pub const fn line(self) -> usize {
+        ((self.0 as u32) << 5 >> 7) as usize
+    }
+
+    /// The way to a line.
+    #[inline(always)]
+    pub const fn of_line(index: usize) -> Self {
+        Self((index as i32) << 2)
+    }
+
+    /// The way to a line, of whose exits one is not to be taken.
+    #[inline(always)]
+    pub const fn without(self, exit: usize) -> Self {
+        Self(self.0 | (8 | exit as i32) << 27)
+    }
+
+    /// What [`without`](Self::without) put there: 8 and the exit, or 0.
+    #[inline(always)]
+    pub const fn barred(self) -> usize {
+        (self.0 as u32 >> 27 & 15) as usize
     }
 
     fn of_leaf(record: usize) -> Self {
@@ -72,8 +95,11 @@ impl Exit {
 /// Words behind the last record, so that eight can be read wherever one is.
 pub const AFTER: usize = 7;
 
-/// Greatest index that an exit can hold: 29 bits.
-pub const MAX_INDEX: usize = (1 << 29) - 1;
+/// Greatest record that an exit can hold: 29 bits, the last value left out.
+pub const MAX_RECORD: usize = (1 << 29) - 2;
+
+/// Greatest line: 25 bits.
+pub const MAX_LINE: usize = (1 << 25) - 1;
 
 /// The place of a node of a treelet, breadth first. The root's second place is 4.
 const PLACES: [usize; 7] = [0, 1, 5, 2, 3, 6, 7];
@@ -132,7 +158,7 @@ impl Lines {
         let first = self.0.len();
         self.0.extend(lines.0.into_iter().map(|mut line| {
             for exit in &mut line.exits {
-                let leads_to_a_line = !Exit(*exit).is_leaf() && Exit(*exit).index() > 0;
+                let leads_to_a_line = !Exit(*exit).is_leaf() && Exit(*exit).line() > 0;
                 if leads_to_a_line {
                     *exit += Exit::of_line(first).0;
                 }
@@ -232,12 +258,12 @@ mod tests {
             let quarter = above(half + 1);
             let exit = Exit(line.exits[half | (2 * quarter) | above(half + 2 + quarter)]);
             if exit.is_leaf() {
-                return tree.record(exit.index()).to_vec();
+                return tree.record(exit.record()).to_vec();
             }
-            if exit.index() == 0 {
+            if exit.line() == 0 {
                 return Vec::new();
             }
-            index = exit.index();
+            index = exit.line();
         }
     }
 

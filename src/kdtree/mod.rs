@@ -101,10 +101,10 @@ impl KdTree {
         let bounds = bounds(&triangles);
         let build::Built { mut nodes, references } = build::build(&triangles, bounds, params, progress)?;
         let references = lines::counted(&mut nodes, &references);
-        if references.len().max(nodes.len()) > lines::MAX_INDEX {
+        let lines = lines::Lines::pack(&nodes, &bounds);
+        if references.len() > lines::MAX_RECORD || lines.all().len() > lines::MAX_LINE {
             return Err(Error::Mesh("its tree has more references than a tree can hold".into()));
         }
-        let lines = lines::Lines::pack(&nodes, &bounds);
         let triangles = triangles.into_par_iter().map(Triangle::new).collect();
         let pages = pages::Pages::cut(&nodes, &references, params.page);
         Ok(Self { nodes, references, lines, pages, triangles, bounds, scale, params: params.clone() })

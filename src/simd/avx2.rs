@@ -249,6 +249,10 @@ impl Eight for F32x8 {
         avx!(_mm256_srli_epi32::<BITS>(ids))
     }
     #[inline(always)]
+    fn ids_and(a: __m256i, b: __m256i) -> __m256i {
+        avx!(_mm256_and_si256(a, b))
+    }
+    #[inline(always)]
     fn ids_pick(ids: __m256i, places: __m256i) -> __m256i {
         avx!(_mm256_permutevar8x32_epi32(ids, places))
     }

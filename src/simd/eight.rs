@@ -102,6 +102,16 @@ pub trait Eight: Lanes<8> {
         Self::ids_load(&ids)
     }
 
+    /// The bits that are set in both.
+    #[inline(always)]
+    fn ids_and(a: Self::Ids, b: Self::Ids) -> Self::Ids {
+        let (mut a, b) = (Self::ids_store(a), Self::ids_store(b));
+        for lane in 0..8 {
+            a[lane] &= b[lane];
+        }
+        Self::ids_load(&a)
+    }
+
     /// Lane `i` becomes lane `places[i] & 7`.
     #[inline(always)]
     fn ids_pick(ids: Self::Ids, places: Self::Ids) -> Self::Ids {

@@ -99,6 +99,7 @@ fn check_eight<L: Eight>() {
         let names = L::ids_load(&std::array::from_fn(|i| i as i32 - 4));
         assert_eq!(L::ids_store(L::ids_pick(names, ids)), places.map(|place| (place & 7) - 4));
         assert_eq!(L::ids_store(L::ids_shift::<5>(ids)), places.map(|place| (place as u32 >> 5) as i32));
+        assert_eq!(L::ids_store(L::ids_and(ids, names)), std::array::from_fn(|i| places[i] & (i as i32 - 4)));
         let narrow = places.map(|place| place as u16);
         assert_eq!(L::ids_store(L::ids_widen(&narrow)), narrow.map(i32::from));
 

@@ -28,7 +28,7 @@ use crate::geometry::triangle::{self, Mode, Test};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{Exit, Tree};
 use crate::simd::{Simd, prefetch};
-use flight::{Flight, NONE, Start};
+use flight::{Flight, Group, NONE};
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 use step::{END, Waiting, step};
@@ -126,6 +126,15 @@ impl List {
         self.len += usize::from(wanted);
     }
 
+    /// Moves all that is on another list to this one.
+    #[inline(always)]
+    fn append(&mut self, other: &mut Self) {
+        for &flight in other.all() {
+            self.push_if(usize::from(flight), true);
+        }
+        other.len = 0;
+    }
+
     #[inline(always)]
     fn all(&self) -> &[u16] {
         &self.flights[..self.len]
@@ -152,8 +161,8 @@ impl Lists {
         self.lines.push_if(flight, !exit.is_leaf());
         self.leaves.push_if(flight, exit.is_leaf() & !ended);
         self.ended.push_if(flight, ended);
-        let line = tree.lines().as_ptr().wrapping_add(exit.index()).cast::<u32>();
-        let record = tree.references().as_ptr().wrapping_add(exit.index());
+        let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
+        let record = tree.references().as_ptr().wrapping_add(exit.record());
         prefetch(select_unpredictable(exit.is_leaf(), record, line));
     }
 }
@@ -193,28 +202,31 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
     let mut triangles = List::new();
     let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
     let mut ahead = 0;
+    let mut group = Group::new();
     let plain = tree.scale().is_none();
     loop {
-        // New rays in the place of those that have ended.
-        while ahead < rays.len()
-            && let Some(&k) = free.last()
-        {
-            let k = usize::from(k);
-            let number = ahead;
-            ahead += 1;
-            match Flight::start::<S::F4>(&rays[number], number as u32, tree.bounds(), &mut stacks[k]) {
-                Start::Flies(flight) if plain => {
-                    free.pop();
+        // New rays in the place of those that have ended, eight at a time.
+        while ahead < rays.len() && free.len() >= 8 {
+            let eight = &rays[ahead..rays.len().min(ahead + 8)];
+            group.prepare::<S::F8>(eight, tree.bounds(), lines);
+            for (lane, ray) in eight.iter().enumerate() {
+                let number = ahead + lane;
+                if group.odd >> lane & 1 == 1 || !plain {
+                    answers.odd::<T, M>(tree, records, number, rays);
+                } else if group.flies >> lane & 1 == 0 {
+                    answers.missed(number);
+                } else {
+                    let k = usize::from(free.pop().expect("as many as rays"));
+                    let flight = group.start(lane, ray, number, &mut stacks[k]);
+                    now.route(tree, k, stacks[k].exits[flight.top as usize]);
                     if k == flights.len() {
                         flights.push(flight);
                     } else {
                         flights[k] = flight;
                     }
-                    now.lines.push_if(k, true);
                 }
-                Start::Misses if plain => answers.missed(number),
-                _ => answers.odd::<T, M>(tree, records, number, rays),
             }
+            ahead += eight.len();
         }
         if free.len() == IN_FLIGHT {
             return;
@@ -225,7 +237,7 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
             let k = usize::from(k);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let mut top = flight.top as usize;
-            let record = Exit(waiting.exits[top]).index();
+            let record = Exit(waiting.exits[top]).record();
             top -= 1;
             if leaf::visit::<S::F8, M::Alone>(flight, tree.references(), record, records) {
                 if A::ANY {
@@ -243,7 +255,7 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
         // Leaves whose records are here.
         for &k in now.leaves.all() {
             let exit = Exit(stacks[usize::from(k)].exits[flights[usize::from(k)].top as usize]);
-            for &primitive in tree.record(exit.index()) {
+            for &primitive in tree.record(exit.record()) {
                 let record = records.as_ptr().wrapping_add(primitive as usize);
                 prefetch(record);
                 prefetch(record.cast::<u8>().wrapping_add(size_of::<M::Record>() - 1));
@@ -257,14 +269,14 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
             let k = usize::from(k);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
-            let line = &lines[Exit(waiting.exits[top]).index()];
-            let top = step::<S::F8>(line, &flight.crossing, waiting, top, flight.tfar);
+            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
             flight.top = top as u32;
             next.route(tree, k, waiting.exits[top]);
         }
         now.lines.len = 0;
 
         // Rays that have ended.
+        next.ended.append(&mut now.ended);
         for &k in next.ended.all() {
             let flight = &flights[usize::from(k)];
             if flight.primitive == NONE {

@@ -10,7 +10,7 @@
 //! tell which wall is before an exit and which is behind it: lane 7 is the exit on the near side of all
 //! three, lane 0 on the far side.
 
-use crate::kdtree::Line;
+use crate::kdtree::{Exit, Line};
 use crate::simd::{Eight, Mask};
 
 /// A ray as lines see it, `x y z` and a number that means nothing.
@@ -55,7 +55,9 @@ fn eight<T>(values: &mut [T], from: usize) -> &mut [T; 8] {
 
 /// Takes the line on top of a stack, puts its exits there, and gives the new top. The ray ends at `tfar`.
 #[inline(always)]
-pub fn step<L: Eight>(line: &Line, ray: &Crossing, waiting: &mut Waiting, top: usize, tfar: f32) -> usize {
+pub fn step<L: Eight>(lines: &[Line], ray: &Crossing, waiting: &mut Waiting, top: usize, tfar: f32) -> usize {
+    let way = Exit(waiting.exits[top]);
+    let line = &lines[way.line()];
     let tmin = L::splat(waiting.tmin[top]);
     let tmax = L::splat(waiting.tmax[top]).min(L::splat(tfar));
 
@@ -76,7 +78,7 @@ pub fn step<L: Eight>(line: &Line, ray: &Crossing, waiting: &mut Waiting, top: u
     let first = upper.pick_in_fours(L::ids_load(&[2, 2, 2, 2, 0, 0, 0, 0]));
     let second = upper.pick(L::ids_shift::<4>(order));
     let third = lower.pick(L::ids_shift::<8>(order));
-    let exits = L::ids_pick(exits, order);
+    let exits = L::ids_pick(L::ids_and(exits, L::ids_load(&OPEN[way.barred()])), order);
 
     let [far_first, far_second, far_third] =
         [L::mask_from_bits(0b0000_1111), L::mask_from_bits(0b0011_0011), L::mask_from_bits(0b0101_0101)];
@@ -120,4 +122,15 @@ static ORDERS: [[u16; 8]; 256] = {
         down += 1;
     }
     orders
+};
+
+/// Clears the exit that is barred ([`Exit::barred`]).
+static OPEN: [[i32; 8]; 16] = {
+    let mut rows = [[-1; 8]; 16];
+    let mut exit = 0;
+    while exit < 8 {
+        rows[8 + exit][exit] = 0;
+        exit += 1;
+    }
+    rows
 };
