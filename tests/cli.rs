@@ -421,7 +421,7 @@ mod bad_input {
             ("--tile 1025", "--tile: 1025"),
             ("--threads 1025", "--threads: 1025"),
             ("--accuracy precise", "--accuracy: \"precise\" is not one of fast, watertight, exact"),
-            ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 256"),
+            ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256"),
             ("--orbit 0", "--orbit: 0"),
             ("--orbit 4 --step inf", "--step: inf"),
             ("--camera eye=1,2,3", "--camera: at is missing"),

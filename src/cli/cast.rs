@@ -136,8 +136,9 @@ pub fn run(args: &Args) -> Result<()> {
 impl Args {
     fn kernel(&self) -> Result<Option<Kernel>> {
         let of_width = |width| {
-            Kernel::of_width(width)
-                .ok_or_else(|| Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 256")))
+            Kernel::of_width(width).ok_or_else(|| {
+                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256"))
+            })
         };
         self.packet.map(of_width).transpose()
     }

@@ -136,7 +136,7 @@ impl Args {
         let packet = match self.packet {
             None => profile.render.packet,
             Some(width) => Kernel::of_width(width).ok_or_else(|| {
-                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 256"))
+                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256"))
             })?,
         };
         let tuning = Tuning {

@@ -4,6 +4,7 @@
 //! leaves, and the triangles of a leaf. How nodes lie in memory is this room's own business.
 
 mod build;
+mod lines;
 mod node;
 mod pages;
 mod params;
@@ -13,6 +14,7 @@ mod stats;
 mod validate;
 
 pub use build::BuildProgress;
+pub use lines::{Exit, Line};
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
 pub use scale::{Scale, exponent};
@@ -46,6 +48,12 @@ pub trait Tree {
     fn beneath(&self, place: usize) -> Node;
     /// The primitives that a page of the upper tree holds, each once.
     fn page(&self, leaf: Node) -> &[u32];
+    /// The tree in cache lines; the root is the first.
+    fn lines(&self) -> &[Line];
+    /// The words of all leaves' records.
+    fn references(&self) -> &[u32];
+    /// The primitive ids of the leaf whose record begins at a word.
+    fn record(&self, word: usize) -> &[u32];
     /// A triangle's record.
     fn triangle(&self, primitive: u32) -> &Triangle;
     /// A triangle's corners.
@@ -60,8 +68,10 @@ pub trait Tree {
 pub struct KdTree {
     /// The root, an unused place, and then pairs of siblings.
     nodes: Vec<Node>,
-    /// Primitive ids, leaf after leaf.
+    /// Primitive ids, leaf after leaf, each leaf's behind their number.
     references: Vec<u32>,
+    /// The same tree for kernels that trace one ray at a time.
+    lines: lines::Lines,
     /// The same tree for kernels that look at many triangles at once.
     pages: pages::Pages,
     /// Records by primitive id.
@@ -82,9 +92,14 @@ impl KdTree {
     pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
         params.check()?;
         let (triangles, bounds, scale) = gather(mesh)?;
-        let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        let build::Built { mut nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        let references = lines::counted(&mut nodes, &references);
+        let lines = lines::Lines::pack(&nodes, &bounds);
+        if references.len() > lines::MAX_RECORD || lines.all().len() > lines::MAX_LINE {
+            return Err(Error::Mesh("its tree has more references than a tree can hold".into()));
+        }
         let pages = pages::Pages::cut(&nodes, &references, params.page);
-        Ok(Self { nodes, references, pages, triangles, bounds, scale, params: params.clone() })
+        Ok(Self { nodes, references, lines, pages, triangles, bounds, scale, params: params.clone() })
     }
 
     /// The box around all triangles, in the mesh's coordinates.
@@ -192,6 +207,22 @@ impl Tree for KdTree {
     #[inline(always)]
     fn page(&self, leaf: Node) -> &[u32] {
         &self.pages.primitives[leaf.references()]
+    }
+
+    #[inline(always)]
+    fn lines(&self) -> &[Line] {
+        self.lines.all()
+    }
+
+    #[inline(always)]
+    fn references(&self) -> &[u32] {
+        &self.references
+    }
+
+    #[inline(always)]
+    fn record(&self, word: usize) -> &[u32] {
+        let first = word + 1;
+        &self.references[first..first + self.references[word] as usize]
     }
 
     #[inline(always)]

@@ -44,6 +44,8 @@ pub struct TreeStats {
     pub triangle_bytes: usize,
     /// Memory of the pages.
     pub page_bytes: usize,
+    /// Memory of the lines.
+    pub line_bytes: usize,
     /// Pages that are not empty.
     pub pages: usize,
     /// Triangles in a page, empty ones not counted.
@@ -55,7 +57,7 @@ pub struct TreeStats {
 impl TreeStats {
     /// All memory of the tree.
     pub fn bytes(&self) -> usize {
-        self.node_bytes + self.reference_bytes + self.page_bytes + self.triangle_bytes
+        self.node_bytes + self.reference_bytes + self.line_bytes + self.page_bytes + self.triangle_bytes
     }
 }
 
@@ -72,6 +74,7 @@ impl KdTree {
             reference_bytes: self.references.len() * size_of::<u32>(),
             triangle_bytes: self.triangles.len() * size_of::<Triangle>(),
             page_bytes: self.pages.bytes(),
+            line_bytes: self.lines.bytes(),
             pages: self.pages.upper.iter().filter(|n| n.is_leaf() && !n.references().is_empty()).count(),
             ..TreeStats::default()
         };

@@ -157,8 +157,9 @@ fn validate_sees_what_is_broken() {
         change(&mut tree);
         tree.validate().expect_err("something is broken")
     };
-    assert!(fault(|t| t.references[5] = t.references[6] ^ 1).contains("missing from a leaf"));
-    assert!(fault(|t| t.references[0] = 300).contains("names triangle"));
+    assert!(fault(|t| t.references[1] ^= 1).contains("missing from a leaf"));
+    assert!(fault(|t| t.references[1] = 300).contains("names triangle"));
+    assert!(fault(|t| t.references[0] += 1).contains("no number before"));
     assert!(fault(|t| t.nodes[0] = Node::inner(0, 5.0, t.nodes.len() - 1)).contains("children would be at"));
     assert!(fault(|t| t.nodes[0] = Node::inner(t.nodes[0].axis(), 1e9, 2)).contains("outside of its cell"));
     let circle = |t: &mut KdTree| t.nodes[3] = Node::inner(t.nodes[3].axis(), t.nodes[3].split(), 2);

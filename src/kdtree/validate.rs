@@ -1,6 +1,6 @@
 //! The proof that a tree is whole.
 
-use super::{KdTree, MAX_DEPTH, Node, Tree};
+use super::{KdTree, MAX_DEPTH, Node, Tree, lines};
 use crate::geometry::Aabb;
 use crate::geometry::clip::Polygon;
 
@@ -35,6 +35,8 @@ impl KdTree {
     fn validate_shape(&self) -> Result<(), String> {
         let mut pairs = vec![false; self.nodes.len() / 2 + 1];
         let mut owned = vec![false; self.references.len()];
+        let after = owned.len().saturating_sub(lines::AFTER);
+        owned[after..].fill(true);
         let mut stack = vec![(*self.nodes.first().ok_or("there is no root")?, self.bounds, 0)];
         while let Some((node, cell, depth)) = stack.pop() {
             if depth > MAX_DEPTH {
@@ -42,6 +44,15 @@ impl KdTree {
             }
             if node.is_leaf() {
                 let range = node.references();
+                if range.is_empty() {
+                    continue;
+                }
+                // The word in front of a leaf's references is their number.
+                let record = range.start.wrapping_sub(1);
+                if self.references.get(record).is_none_or(|&count| count as usize != range.len()) {
+                    return Err(format!("there is no number before references {range:?}"));
+                }
+                owned[record] = true;
                 let list = owned
                     .get_mut(range.clone())
                     .ok_or_else(|| format!("a leaf names references {range:?}"))?;

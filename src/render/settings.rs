@@ -154,7 +154,7 @@ mod packet_width {
         usize::try_from(width)
             .ok()
             .and_then(Kernel::of_width)
-            .ok_or_else(|| D::Error::custom(format!("packet = {width} is not one of 1, 4, 8, 16, 256")))
+            .ok_or_else(|| D::Error::custom(format!("packet = {width} is not one of 1, 4, 8, 16, 64, 256")))
     }
 }
 

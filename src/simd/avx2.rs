@@ -6,6 +6,7 @@
 //! `#[target_feature]` entries of `isa.rs`, which a [`super::Chosen`] reaches only after the
 //! machine has been asked. So wherever a method of these types runs, the machine has AVX2.
 
+use super::eight::{Eight, LANES_OF};
 use super::lanes::{Lanes, Mask, Simd};
 use super::pair::Pair;
 use std::arch::x86_64::*;
@@ -186,3 +187,77 @@ avx2_lanes!(8, F32x8, Mask8, __m256, __m256i,
     _mm256_cmp_ps _mm256_blendv_ps _mm256_movemask_ps _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps
     _mm256_set1_epi32 _mm256_cmpgt_epi32 weights8 _mm256_and_si256 _mm256_cmpeq_epi32 _mm256_storeu_si256
     _mm256_castsi256_ps _mm256_castps_si256);
+
+/// The lanes in `bits`, one behind the other, as a permutation.
+#[inline(always)]
+fn lanes_of(bits: u32) -> __m256i {
+    let row = &LANES_OF[(bits & 0xff) as usize];
+    avx!(_mm256_cvtepu8_epi32(_mm_loadl_epi64(row.as_ptr().cast())))
+}
+
+impl Eight for F32x8 {
+    #[inline(always)]
+    fn of_fours([low, high]: [&[f32; 4]; 2]) -> Self {
+        let low = avx!(_mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr())));
+        Self(avx!(_mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr()))))
+    }
+    #[inline(always)]
+    fn pick_in_fours(self, ids: __m256i) -> Self {
+        Self(avx!(_mm256_permutevar_ps(self.0, ids)))
+    }
+    #[inline(always)]
+    fn pick(self, ids: __m256i) -> Self {
+        Self(avx!(_mm256_permutevar8x32_ps(self.0, ids)))
+    }
+    #[inline(always)]
+    fn first_pairs(self, other: Self) -> Self {
+        Self(avx!(_mm256_shuffle_ps::<0x44>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn last_pairs(self, other: Self) -> Self {
+        Self(avx!(_mm256_shuffle_ps::<0xee>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn transpose_fours([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        let low_ab = avx!(_mm256_unpacklo_ps(a.0, b.0));
+        let low_cd = avx!(_mm256_unpacklo_ps(c.0, d.0));
+        let high_ab = avx!(_mm256_unpackhi_ps(a.0, b.0));
+        let high_cd = avx!(_mm256_unpackhi_ps(c.0, d.0));
+        let (low_ab, low_cd) = (Self(low_ab), Self(low_cd));
+        let (high_ab, high_cd) = (Self(high_ab), Self(high_cd));
+        [
+            low_ab.first_pairs(low_cd),
+            low_ab.last_pairs(low_cd),
+            high_ab.first_pairs(high_cd),
+            high_ab.last_pairs(high_cd),
+        ]
+    }
+    #[inline(always)]
+    fn compact(self, bits: u32, to: &mut [f32; 8]) {
+        avx!(_mm256_storeu_ps(to.as_mut_ptr(), _mm256_permutevar8x32_ps(self.0, lanes_of(bits))));
+    }
+    #[inline(always)]
+    fn ids_load(ids: &[i32; 8]) -> __m256i {
+        avx!(_mm256_loadu_si256(ids.as_ptr().cast()))
+    }
+    #[inline(always)]
+    fn ids_widen(ids: &[u16; 8]) -> __m256i {
+        avx!(_mm256_cvtepu16_epi32(_mm_loadu_si128(ids.as_ptr().cast())))
+    }
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: __m256i) -> __m256i {
+        avx!(_mm256_srli_epi32::<BITS>(ids))
+    }
+    #[inline(always)]
+    fn ids_and(a: __m256i, b: __m256i) -> __m256i {
+        avx!(_mm256_and_si256(a, b))
+    }
+    #[inline(always)]
+    fn ids_pick(ids: __m256i, places: __m256i) -> __m256i {
+        avx!(_mm256_permutevar8x32_epi32(ids, places))
+    }
+    #[inline(always)]
+    fn ids_compact(ids: __m256i, bits: u32, to: &mut [i32; 8]) {
+        avx!(_mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(ids, lanes_of(bits))));
+    }
+}

@@ -1,5 +1,6 @@
 //! What a vector of `W` floats can do.
 
+use super::eight::Eight;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 /// One bit a lane: the result of comparing [`Lanes`].
@@ -105,7 +106,7 @@ pub trait Simd {
     /// Four floats.
     type F4: Lanes<4>;
     /// Eight floats.
-    type F8: Lanes<8>;
+    type F8: Eight;
     /// Sixteen floats.
     type F16: Lanes<16>;
 }

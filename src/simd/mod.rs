@@ -11,9 +11,11 @@
 //! triangle test hold (a fused difference of products can have the wrong sign). [`Lanes::mul_add`]
 //! alone may fuse: it is for bounds.
 
+mod eight;
 mod isa;
 mod lanes;
 mod portable;
+mod prefetch;
 mod scalar;
 
 #[cfg(target_arch = "x86_64")]
@@ -23,8 +25,10 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod pair;
 
+pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};
+pub use prefetch::prefetch;
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! The portable implementation, through `wide`: SSE2 on x86-64, NEON on AArch64, and so on.
 
+use super::eight::Eight;
 use super::lanes::{Lanes, Mask, Simd};
 use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -135,3 +136,10 @@ macro_rules! portable_lanes {
 portable_lanes!(4, F32x4, Mask4, f32x4, i32x4);
 portable_lanes!(8, F32x8, Mask8, f32x8, i32x8);
 portable_lanes!(16, F32x16, Mask16, f32x16, i32x16);
+
+impl Eight for F32x8 {
+    #[inline(always)]
+    fn ids_load(ids: &[i32; 8]) -> wide::i32x8 {
+        wide::i32x8::new(*ids)
+    }
+}

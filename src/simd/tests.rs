@@ -71,6 +71,48 @@ fn check<const W: usize, L: Lanes<W>>() {
     }
 }
 
+/// Checks what eight lanes can do beside that, against a model of each.
+fn check_eight<L: Eight>() {
+    let a: [f32; 8] = std::array::from_fn(|i| i as f32 + 0.5);
+    let b = a.map(|x| x + 100.0);
+    let (x, y) = (L::load(&a), L::load(&b));
+    let four = |from: usize| -> &[f32; 4] { b[from..from + 4].try_into().unwrap() };
+    assert_eq!(L::of_fours([four(1), four(3)]).store(), [1, 2, 3, 4, 3, 4, 5, 6].map(|i| b[i]));
+    let [a2, b2] =
+        [[0, 1], [2, 3]].map(|[i, j]| [a[i], a[j], b[i], b[j], a[i + 4], a[j + 4], b[i + 4], b[j + 4]]);
+    assert_eq!((x.first_pairs(y).store(), x.last_pairs(y).store()), (a2, b2));
+
+    let rows: [[f32; 8]; 4] = std::array::from_fn(|i| a.map(|x| x + 10.0 * i as f32));
+    let turned = L::transpose_fours([0, 1, 2, 3].map(|i| L::load(&rows[i])));
+    for (j, turned) in turned.into_iter().enumerate() {
+        assert_eq!(turned.store(), std::array::from_fn(|lane| rows[lane & 3][lane & 4 | j]));
+    }
+
+    for bits in 0..256u32 {
+        // Numbers beyond the lanes show that only the low bits count.
+        let places: [i32; 8] = std::array::from_fn(|i| (bits.wrapping_mul(2654435761) >> (3 * i)) as i32);
+        let ids = L::ids_load(&places);
+        assert_eq!(L::ids_store(ids), places);
+        assert_eq!(x.pick(ids).store(), places.map(|place| a[(place & 7) as usize]));
+        let fours: [f32; 8] = std::array::from_fn(|i| a[i & 4 | (places[i] & 3) as usize]);
+        assert_eq!(x.pick_in_fours(ids).store(), fours);
+        let names = L::ids_load(&std::array::from_fn(|i| i as i32 - 4));
+        assert_eq!(L::ids_store(L::ids_pick(names, ids)), places.map(|place| (place & 7) - 4));
+        assert_eq!(L::ids_store(L::ids_shift::<5>(ids)), places.map(|place| (place as u32 >> 5) as i32));
+        assert_eq!(L::ids_store(L::ids_and(ids, names)), std::array::from_fn(|i| places[i] & (i as i32 - 4)));
+        let narrow = places.map(|place| place as u16);
+        assert_eq!(L::ids_store(L::ids_widen(&narrow)), narrow.map(i32::from));
+
+        let (mut values, mut kept) = ([0.0; 8], [0; 8]);
+        x.compact(bits, &mut values);
+        L::ids_compact(ids, bits, &mut kept);
+        let lanes: Vec<usize> = (0..8).filter(|lane| bits >> lane & 1 == 1).collect();
+        for (next, &lane) in lanes.iter().enumerate() {
+            assert_eq!((values[next], kept[next]), (a[lane], places[lane]));
+        }
+    }
+}
+
 struct CheckAll;
 
 impl Task for CheckAll {
@@ -81,6 +123,7 @@ impl Task for CheckAll {
         check::<4, S::F4>();
         check::<8, S::F8>();
         check::<16, S::F16>();
+        check_eight::<S::F8>();
     }
 }
 

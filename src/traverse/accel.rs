@@ -20,11 +20,11 @@ use std::sync::Arc;
 /// with several instruction sets and accuracies side by side.
 #[derive(Clone, Debug)]
 pub struct Accel {
-    tree: Arc<KdTree>,
-    chosen: Chosen,
-    accuracy: Accuracy,
+    pub(super) tree: Arc<KdTree>,
+    pub(super) chosen: Chosen,
+    pub(super) accuracy: Accuracy,
     /// The fast test's records, empty until that mode is chosen.
-    projected: Arc<[Projected]>,
+    pub(super) projected: Arc<[Projected]>,
 }
 
 impl Accel {
@@ -217,6 +217,7 @@ impl Accel {
             Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
             Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
+            Kernel::Stream => self.intersect_stream(rays, hits),
             Kernel::Tile => self.intersect_tiles(rays, hits),
         }
     }
@@ -230,6 +231,7 @@ impl Accel {
             Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
             Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
+            Kernel::Stream => self.occluded_stream(rays, occluded),
             Kernel::Tile => self.occluded_tiles(rays, occluded),
         }
     }

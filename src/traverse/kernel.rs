@@ -13,21 +13,25 @@ pub enum Kernel {
     Packet8,
     /// Sixteen.
     Packet16,
+    /// Sixty-four rays in flight, each alone: for rays that have nothing in common.
+    Stream,
     /// Up to 256 rays from one point as sixteen packets; rays that are too unlike go packet by packet.
     Tile,
 }
 
 impl Kernel {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16, Self::Tile];
+    pub const ALL: [Self; 6] =
+        [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16, Self::Stream, Self::Tile];
 
-    /// `single`, `packet4`, `packet8`, `packet16` or `tile`.
+    /// `single`, `packet4`, `packet8`, `packet16`, `stream` or `tile`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Single => "single",
             Self::Packet4 => "packet4",
             Self::Packet8 => "packet8",
             Self::Packet16 => "packet16",
+            Self::Stream => "stream",
             Self::Tile => "tile",
         }
     }
@@ -39,6 +43,7 @@ impl Kernel {
             Self::Packet4 => 4,
             Self::Packet8 => 8,
             Self::Packet16 => 16,
+            Self::Stream => 64,
             Self::Tile => 256,
         }
     }
@@ -50,6 +55,7 @@ impl Kernel {
             Self::Packet4 => "packets of 4",
             Self::Packet8 => "packets of 8",
             Self::Packet16 => "packets of 16",
+            Self::Stream => "streams of 64",
             Self::Tile => "beams of 256",
         }
     }

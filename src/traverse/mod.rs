@@ -18,6 +18,7 @@ mod packet;
 mod query;
 mod range;
 mod stack;
+mod stream;
 mod tile;
 mod walk;
 

@@ -24,7 +24,7 @@ use crate::simd::{Lanes, Mask};
 pub const MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// The least direction component, relative to the greatest.
-const FLATTEST: f32 = 1.0 / (1u64 << 40) as f32;
+pub const FLATTEST: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// On which side of a plane across an axis rays come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

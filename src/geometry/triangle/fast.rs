@@ -15,8 +15,8 @@
 //! What is given up is agreement between neighbours: each side of a shared edge is decided from its
 //! own numbers, so a ray may slip between the two, or hit both.
 
-use super::{Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
-use crate::simd::Lanes;
+use super::{Alone, Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
+use crate::simd::{Eight, Lanes};
 use glam::{DVec3, Vec3};
 
 /// A triangle made ready: 44 bytes. "Renamed" coordinates are `RENAMED[axis]`, and its corners here
@@ -136,5 +136,12 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
             1 => [rest, u],
             _ => [v, rest],
         }
+    }
+}
+
+impl Alone for Lines<1, f32> {
+    #[inline(always)]
+    fn sift<L: Eight>(&self, _triangles: &[&Projected; 8], _tnear: f32, _tfar: f32) -> u32 {
+        0xff
     }
 }

@@ -1,7 +1,7 @@
 //! What every ray-triangle test is to a traversal kernel.
 
 use super::{Accuracy, Triangle};
-use crate::simd::Lanes;
+use crate::simd::{Eight, Lanes};
 
 /// Three coordinates, `W` lanes each.
 pub type Lanes3<L> = [L; 3];
@@ -77,6 +77,13 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     }
 }
 
+/// One ray prepared for being tested against many triangles at once.
+pub trait Alone: Test<1, f32> {
+    /// A bit for each of eight triangles that the ray may hit with a `t` from `tnear` to `tfar`: for all
+    /// that [`test`](Test::test) finds there, and for few others.
+    fn sift<L: Eight>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> u32;
+}
+
 /// The lanes of a packet that may have hit a triangle.
 pub struct Candidate<const W: usize, L: Lanes<W>> {
     /// Lanes in which the line meets the triangle: `t` is not compared with anything yet.
@@ -109,6 +116,8 @@ pub trait Mode {
     type Record: Send + Sync;
     /// The test for `W` rays in lanes `L`.
     type Test<const W: usize, L: Lanes<W>>: Test<W, L, Record = Self::Record>;
+    /// The test for one ray.
+    type Alone: Alone<Record = Self::Record>;
 }
 
 /// [`Accuracy::Fast`] as a type.
@@ -128,6 +137,7 @@ impl Mode for Fast {
     const SURE: bool = false;
     type Record = super::fast::Projected;
     type Test<const W: usize, L: Lanes<W>> = super::fast::Lines<W, L>;
+    type Alone = super::fast::Lines<1, f32>;
 }
 
 impl Mode for Watertight {
@@ -135,6 +145,7 @@ impl Mode for Watertight {
     const SURE: bool = true;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::watertight::Shear<W, L>;
+    type Alone = super::watertight::Shear<1, f32>;
 }
 
 impl Mode for Exact {
@@ -142,4 +153,5 @@ impl Mode for Exact {
     const SURE: bool = true;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
+    type Alone = super::exact::Filter<1, f32>;
 }

@@ -1,6 +1,6 @@
 //! raypack as an engine: a mode for every kernel, and `auto`, which chooses among them as it goes.
 //!
-//! The single-ray kernel is given rays, the packet kernels packets, each made before the clock starts; the
+//! The single-ray and the stream kernel are given rays, the packet kernels packets, each made before the clock starts; the
 //! records go out in the kernel's own form.
 
 use super::engine::{Contender, Engine, Lot, Results, collect};
@@ -150,9 +150,9 @@ impl Engine for Ours {
 
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
         let contender = |kernel| match kernel {
-            Kernel::Single => {
+            Kernel::Single | Kernel::Stream => {
                 let lots = Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec);
-                Box::new(SingleRun { engine: self, lots }) as Box<dyn Contender + 'a>
+                Box::new(SliceRun { engine: self, kernel, lots }) as Box<dyn Contender + 'a>
             }
             Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
             Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
@@ -163,14 +163,16 @@ impl Engine for Ours {
     }
 }
 
-struct SingleRun<'a> {
+/// A kernel that is given rays one by one.
+struct SliceRun<'a> {
     engine: &'a Ours,
+    kernel: Kernel,
     lots: Vec<Lot<Vec<Ray>, Hit, bool>>,
 }
 
-impl Contender for SingleRun<'_> {
+impl Contender for SliceRun<'_> {
     fn mode(&self) -> String {
-        Kernel::Single.name().into()
+        self.kernel.name().into()
     }
 
     fn build_seconds(&self) -> f64 {
@@ -184,8 +186,8 @@ impl Contender for SingleRun<'_> {
     fn trace(&self, chunk: usize) {
         let accel = &self.engine.accel;
         self.lots[chunk].trace(
-            |rays, hits| accel.intersect_many(Kernel::Single, rays, hits),
-            |rays, flags| accel.occluded_many(Kernel::Single, rays, flags),
+            |rays, hits| accel.intersect_many(self.kernel, rays, hits),
+            |rays, flags| accel.occluded_many(self.kernel, rays, flags),
         );
     }
 

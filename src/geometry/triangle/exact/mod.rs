@@ -10,8 +10,8 @@
 mod determinant;
 
 use super::watertight::Shear;
-use super::{Candidate, Corners, Lanes3, Test, Triangle};
-use crate::simd::{Lanes, Mask};
+use super::{Alone, Candidate, Corners, Lanes3, Test, Triangle};
+use crate::simd::{Eight, Lanes, Mask};
 use determinant::{along_normal, volume};
 use glam::{DVec3, Vec3};
 
@@ -65,6 +65,13 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
             u: L::load(&met.u),
             v: L::load(&met.v),
         }
+    }
+}
+
+impl Alone for Filter<1, f32> {
+    #[inline(always)]
+    fn sift<L: Eight>(&self, triangles: &[&Triangle; 8], _tnear: f32, _tfar: f32) -> u32 {
+        self.shear.likely_of_eight::<L>(triangles)
     }
 }
 

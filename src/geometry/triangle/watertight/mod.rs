@@ -15,6 +15,7 @@
 //! There is no culling, so the paper's swap of x and y for rays that run against z is left out:
 //! it would only turn all three signs round.
 
+mod alone;
 mod distance;
 mod placed;
 
@@ -91,21 +92,26 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// Where anything overflows, so does the bound, and the lane is likely.
     #[inline(always)]
     pub(super) fn likely(&self, corners: &Corners) -> L::Mask {
-        let [ax, ay, az] = self.sheared(&corners[0]);
-        let [bx, by, bz] = self.sheared(&corners[1]);
-        let [cx, cy, cz] = self.sheared(&corners[2]);
-        let a = cx * by - cy * bx;
-        let b = ax * cy - ay * cx;
-        let c = bx * ay - by * ax;
-
-        // Translated x and y are at most the sheared ones and z together.
-        let wide = ax.abs().max(ay.abs()).max(bx.abs()).max(by.abs()).max(cx.abs()).max(cy.abs());
-        let far = wide + az.abs().max(bz.abs()).max(cz.abs());
-        let tiny = L::splat(1e-43);
-        let error =
-            L::splat(1.0 / (1 << 18) as f32) * far * (wide + L::splat(1.0 / (1 << 20) as f32) * far) + tiny;
-        !(a.min(b).min(c).lt(L::splat(0.0) - error) & error.lt(a.max(b).max(c)))
+        likely([self.sheared(&corners[0]), self.sheared(&corners[1]), self.sheared(&corners[2])])
     }
+}
+
+/// Lanes in which a triangle with its corners sheared is likely.
+#[inline(always)]
+fn likely<const W: usize, L: Lanes<W>>(
+    [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]: [Lanes3<L>; 3],
+) -> L::Mask {
+    let a = cx * by - cy * bx;
+    let b = ax * cy - ay * cx;
+    let c = bx * ay - by * ax;
+
+    // Translated x and y are at most the sheared ones and z together.
+    let wide = ax.abs().max(ay.abs()).max(bx.abs()).max(by.abs()).max(cx.abs()).max(cy.abs());
+    let far = wide + az.abs().max(bz.abs()).max(cz.abs());
+    let tiny = L::splat(1e-43);
+    let error =
+        L::splat(1.0 / (1 << 18) as f32) * far * (wide + L::splat(1.0 / (1 << 20) as f32) * far) + tiny;
+    !(a.min(b).min(c).lt(L::splat(0.0) - error) & error.lt(a.max(b).max(c)))
 }
 
 /// `(dx/dz, dy/dz, 1/dz)` in renamed coordinates, kept.

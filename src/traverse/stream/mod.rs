@@ -1,0 +1,292 @@
+//! The stream kernel: many rays in flight, each alone (a *wavefront*).
+//!
+//! Incoherent rays have nothing to share, and one by one they spend their time waiting for memory and on
+//! branches that nobody can foresee. Here some sixty rays are on their way at once. Each round does one
+//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or a leaf. Rays that
+//! need the same work stand in one list, so that no branch depends on what a ray meets; and what a ray
+//! needs in its next round is fetched while the others have theirs.
+//!
+//! ```text
+//!          +--------------------------------------------+
+//!          v                                            |
+//! start -> lines -> leaves  -> triangles -> (next on the stack) -> end: the next ray starts
+//!  fetch:  line     record     triangles
+//! ```
+//!
+//! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
+//! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not
+//! ordinary (`range.rs`) are left to the packet kernel.
+
+mod accel;
+mod flight;
+mod leaf;
+mod step;
+
+use super::lanes::RayPacket;
+use super::packet;
+use crate::geometry::triangle::{self, Mode, Test};
+use crate::geometry::{Hit, Ray};
+use crate::kdtree::{Exit, Tree};
+use crate::simd::{Simd, prefetch};
+use flight::{Flight, Group, NONE};
+use std::cell::Cell;
+use std::hint::select_unpredictable;
+use step::{END, Waiting, step};
+
+/// Rays in flight.
+pub const IN_FLIGHT: usize = 64;
+
+/// What is asked of each ray.
+pub trait Answers {
+    /// Whether any hit will do.
+    const ANY: bool;
+
+    /// A ray's answer: the closest hit that was found, or any.
+    fn found<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], flight: &Flight<M::Alone>);
+
+    /// A ray that hits nothing.
+    fn missed(&mut self, ray: usize);
+
+    /// A ray that the packet kernel has to trace.
+    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]);
+}
+
+/// Records of closest hits.
+pub struct Closest<'a>(pub &'a mut [Hit]);
+
+impl Answers for Closest<'_> {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn found<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], flight: &Flight<M::Alone>) {
+        let record = &records[flight.primitive as usize];
+        let [u, v] = M::Alone::weights(record, flight.weights[0], flight.weights[1]);
+        // A zero is given out without a sign.
+        self.0[flight.ray as usize] = Hit {
+            t: flight.tfar + 0.0,
+            u: u + 0.0,
+            v: v + 0.0,
+            primitive: flight.primitive,
+            normal: triangle::normal(tree.corners(flight.primitive)),
+        };
+    }
+
+    #[inline(always)]
+    fn missed(&mut self, ray: usize) {
+        self.0[ray] = Hit::MISS;
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]) {
+        let rays = RayPacket::of_slice(&[rays[ray]]);
+        self.0[ray] = packet::intersect::<1, f32, T, M>(tree, records, &rays, 1).get(0);
+    }
+}
+
+/// Whether rays hit anything.
+pub struct Any<'a>(pub &'a mut [bool]);
+
+impl Answers for Any<'_> {
+    const ANY: bool = true;
+
+    #[inline(always)]
+    fn found<T: Tree, M: Mode>(&mut self, _tree: &T, _records: &[M::Record], flight: &Flight<M::Alone>) {
+        self.0[flight.ray as usize] = true;
+    }
+
+    #[inline(always)]
+    fn missed(&mut self, ray: usize) {
+        self.0[ray] = false;
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]) {
+        let rays = RayPacket::of_slice(&[rays[ray]]);
+        self.0[ray] = packet::occluded::<1, f32, T, M>(tree, records, &rays, 1) == 1;
+    }
+}
+
+/// Rays in flight that wait for the same work.
+struct List {
+    flights: [u16; 2 * IN_FLIGHT],
+    len: usize,
+}
+
+impl List {
+    const fn new() -> Self {
+        Self { flights: [0; 2 * IN_FLIGHT], len: 0 }
+    }
+
+    /// Puts a ray on the list if it is to be there.
+    #[inline(always)]
+    fn push_if(&mut self, flight: usize, wanted: bool) {
+        self.flights[self.len] = flight as u16;
+        self.len += usize::from(wanted);
+    }
+
+    /// Moves all that is on another list to this one.
+    #[inline(always)]
+    fn append(&mut self, other: &mut Self) {
+        for &flight in other.all() {
+            self.push_if(usize::from(flight), true);
+        }
+        other.len = 0;
+    }
+
+    #[inline(always)]
+    fn all(&self) -> &[u16] {
+        &self.flights[..self.len]
+    }
+}
+
+/// Who has to do what in the next round.
+struct Lists {
+    lines: List,
+    leaves: List,
+    ended: List,
+}
+
+impl Lists {
+    const fn new() -> Self {
+        Self { lines: List::new(), leaves: List::new(), ended: List::new() }
+    }
+
+    /// Puts a ray on the list for the exit that it takes, and fetches what it will need.
+    #[inline(always)]
+    fn route<T: Tree>(&mut self, tree: &T, flight: usize, exit: i32) {
+        let ended = exit == END;
+        let exit = Exit(exit);
+        self.lines.push_if(flight, !exit.is_leaf());
+        self.leaves.push_if(flight, exit.is_leaf() & !ended);
+        self.ended.push_if(flight, ended);
+        let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
+        let record = tree.references().as_ptr().wrapping_add(exit.record());
+        prefetch(select_unpredictable(exit.is_leaf(), record, line));
+    }
+}
+
+thread_local! {
+    /// The stacks of the rays in flight, too large to be made anew for each call.
+    static STACKS: Cell<Vec<Waiting>> = const { Cell::new(Vec::new()) };
+}
+
+/// Traces rays and gives an answer for each.
+#[inline(always)]
+pub fn trace<S: Simd, T: Tree, M: Mode, A: Answers>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &[Ray],
+    answers: &mut A,
+) {
+    // Taken out, not borrowed: a closure would be compiled without the instruction set.
+    let mut stacks = STACKS.take();
+    stacks.resize(IN_FLIGHT, Waiting::new());
+    fly::<S, T, M, A>(tree, records, rays, answers, &mut stacks);
+    STACKS.set(stacks);
+}
+
+#[inline(always)]
+fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
+    tree: &T,
+    records: &[M::Record],
+    rays: &[Ray],
+    answers: &mut A,
+    stacks: &mut [Waiting],
+) {
+    let lines = tree.lines();
+    let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
+    let (mut one, mut other) = (Lists::new(), Lists::new());
+    let (mut now, mut next) = (&mut one, &mut other);
+    let mut triangles = List::new();
+    let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
+    let mut ahead = 0;
+    let mut group = Group::new();
+    let plain = tree.scale().is_none();
+    loop {
+        // New rays in the place of those that have ended, eight at a time.
+        while ahead < rays.len() && free.len() >= 8 {
+            let eight = &rays[ahead..rays.len().min(ahead + 8)];
+            group.prepare::<S::F8>(eight, tree.bounds(), lines);
+            for (lane, ray) in eight.iter().enumerate() {
+                let number = ahead + lane;
+                if group.odd >> lane & 1 == 1 || !plain {
+                    answers.odd::<T, M>(tree, records, number, rays);
+                } else if group.flies >> lane & 1 == 0 {
+                    answers.missed(number);
+                } else {
+                    let k = usize::from(free.pop().expect("as many as rays"));
+                    let flight = group.start(lane, ray, number, &mut stacks[k]);
+                    now.route(tree, k, stacks[k].exits[flight.top as usize]);
+                    if k == flights.len() {
+                        flights.push(flight);
+                    } else {
+                        flights[k] = flight;
+                    }
+                }
+            }
+            ahead += eight.len();
+        }
+        if free.len() == IN_FLIGHT {
+            return;
+        }
+
+        // Leaves whose triangles are here.
+        for &k in triangles.all() {
+            let k = usize::from(k);
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let mut top = flight.top as usize;
+            let record = Exit(waiting.exits[top]).record();
+            top -= 1;
+            if leaf::visit::<S::F8, M::Alone>(flight, tree.references(), record, records) {
+                if A::ANY {
+                    top = 0;
+                }
+                while waiting.tmin[top] > flight.tfar {
+                    top -= 1;
+                }
+            }
+            flight.top = top as u32;
+            next.route(tree, k, waiting.exits[top]);
+        }
+        triangles.len = 0;
+
+        // Leaves whose records are here.
+        for &k in now.leaves.all() {
+            let exit = Exit(stacks[usize::from(k)].exits[flights[usize::from(k)].top as usize]);
+            for &primitive in tree.record(exit.record()) {
+                let record = records.as_ptr().wrapping_add(primitive as usize);
+                prefetch(record);
+                prefetch(record.cast::<u8>().wrapping_add(size_of::<M::Record>() - 1));
+            }
+            triangles.push_if(usize::from(k), true);
+        }
+        now.leaves.len = 0;
+
+        // Lines.
+        for &k in now.lines.all() {
+            let k = usize::from(k);
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let top = flight.top as usize;
+            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            flight.top = top as u32;
+            next.route(tree, k, waiting.exits[top]);
+        }
+        now.lines.len = 0;
+
+        // Rays that have ended.
+        next.ended.append(&mut now.ended);
+        for &k in next.ended.all() {
+            let flight = &flights[usize::from(k)];
+            if flight.primitive == NONE {
+                answers.missed(flight.ray as usize);
+            } else {
+                answers.found::<T, M>(tree, records, flight);
+            }
+            free.push(k);
+        }
+        next.ended.len = 0;
+        std::mem::swap(&mut now, &mut next);
+    }
+}
