@@ -93,12 +93,14 @@ impl KdTree {
         params.check()?;
         let (triangles, bounds, scale) = gather(mesh)?;
         let build::Built { mut nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        let pages = pages::Pages::cut(&nodes, &references, params.page);
         let references = lines::counted(&mut nodes, &references);
         let lines = lines::Lines::pack(&nodes, &bounds);
         if references.len() > lines::MAX_RECORD || lines.all().len() > lines::MAX_LINE {
-            return Err(Error::Mesh("its tree has more references than a tree can hold".into()));
+            let message =
+                "its tree has more references than a tree can hold: raise traversal_cost in a profile";
+            return Err(Error::Mesh(message.into()));
         }
-        let pages = pages::Pages::cut(&nodes, &references, params.page);
         Ok(Self { nodes, references, lines, pages, triangles, bounds, scale, params: params.clone() })
     }
 
@@ -201,7 +203,7 @@ impl Tree for KdTree {
 
     #[inline(always)]
     fn beneath(&self, place: usize) -> Node {
-        self.pages.beneath[place]
+        self.nodes[self.pages.beneath[place] as usize]
     }
 
     #[inline(always)]

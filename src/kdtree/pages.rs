@@ -24,8 +24,8 @@ use std::sync::atomic::Ordering::Relaxed;
 pub(super) struct Pages {
     /// The root, an unused place, and then pairs of siblings. A leaf's references are its page's.
     pub upper: Vec<Node>,
-    /// The nodes of the full tree at the same places.
-    pub beneath: Vec<Node>,
+    /// The indices of the full tree's nodes at the same places.
+    pub beneath: Vec<u32>,
     /// Primitive ids, page after page, ascending in each.
     pub primitives: Vec<u32>,
 }
@@ -39,7 +39,7 @@ impl Pages {
         cutter.find(0, 0, &mut Vec::new());
 
         let mut pages = Self { upper: vec![Node::leaf(0, 0); 2], ..Self::default() };
-        pages.beneath = pages.upper.clone();
+        pages.beneath = vec![0; 2];
         let mut roots = Vec::new();
         pages.place(&cutter, 0, 0, &mut roots);
         pages.fill(&cutter, &roots);
@@ -50,14 +50,14 @@ impl Pages {
     /// places of pages, which stay empty, go to `roots`.
     fn place(&mut self, cutter: &Cutter, index: usize, at: usize, roots: &mut Vec<usize>) {
         let node = cutter.nodes[index];
-        self.beneath[at] = node;
+        self.beneath[at] = index as u32;
         if cutter.fits[index].load(Relaxed) {
             roots.push(at);
             return;
         }
         let pair = self.upper.len();
         self.upper.extend([Node::leaf(0, 0); 2]);
-        self.beneath.extend([Node::leaf(0, 0); 2]);
+        self.beneath.extend([0; 2]);
         self.upper[at] = Node::inner(node.axis(), node.split(), pair);
         for child in 0..2 {
             self.place(cutter, node.below() as usize + child, pair + child, roots);
@@ -71,7 +71,9 @@ impl Pages {
             let (mut primitives, mut counts) = (Vec::new(), Vec::with_capacity(places.len()));
             for &at in places {
                 let first = primitives.len();
-                primitives.extend_from_slice(&cutter.references[cutter.references_below(beneath[at])]);
+                primitives.extend_from_slice(
+                    &cutter.references[cutter.references_below(cutter.nodes[beneath[at] as usize])],
+                );
                 sort_and_dedup(&mut primitives, first);
                 counts.push(primitives.len() - first);
             }
@@ -173,13 +175,14 @@ const PAGES_PER_TASK: usize = 512;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::{BuildParams, KdTree};
+    use crate::kdtree::build::{self, Built};
+    use crate::kdtree::{BuildParams, gather};
     use crate::mesh::generate::shapes;
 
     /// Walks both trees together, and gives the pages' sizes.
-    fn compare(tree: &KdTree, pages: &Pages, index: usize, at: usize, sizes: &mut Vec<usize>) {
+    fn compare(tree: &Built, pages: &Pages, index: usize, at: usize, sizes: &mut Vec<usize>) {
         let (node, upper) = (tree.nodes[index], pages.upper[at]);
-        assert_eq!(pages.beneath[at], node);
+        assert_eq!(pages.beneath[at] as usize, index);
         if upper.is_leaf() {
             let mut below: Vec<u32> = Vec::new();
             let mut stack = vec![node];
@@ -205,7 +208,8 @@ mod tests {
     #[test]
     fn pages_hold_what_is_below_them() {
         let mesh = shapes::soup(5000, 1);
-        let tree = KdTree::build(&mesh, &BuildParams::default(), None).expect("builds");
+        let (triangles, bounds, _) = gather(&mesh).expect("triangles");
+        let tree = build::build(&triangles, bounds, &BuildParams::default(), None).expect("builds");
         for limit in [1, 16, 64, 1 << 30] {
             let pages = Pages::cut(&tree.nodes, &tree.references, limit);
             let mut sizes = Vec::new();

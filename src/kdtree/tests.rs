@@ -73,8 +73,7 @@ fn trees_are_whole() {
 
 #[test]
 fn a_large_soup_pays_off() {
-    let params = BuildParams { traversal_cost: 5.0, ..BuildParams::default() };
-    let stats = checked(&soup(20_000, 0.2, 1), &params);
+    let stats = checked(&soup(20_000, 0.2, 1), &BuildParams::default());
     assert!(stats.expected_tests < 90.0, "{stats:?}");
     assert!(stats.references_per_triangle < 6.0, "{stats:?}");
     assert!(stats.depth <= 36);
