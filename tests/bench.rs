@@ -28,6 +28,9 @@ fn bench(model: &PathBuf) -> Command {
     command
 }
 
+/// raypack's modes: its kernels, and the choice among them.
+const MODES: usize = Kernel::ALL.len() + 1;
+
 #[test]
 fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
     let (folder, model) = model();
@@ -48,7 +51,7 @@ fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
                     |r: &&Value| r["engine"] == engine && r["rays"] == rays && r["threads"] == threads;
                 rows.iter().filter(matches).count()
             };
-            assert_eq!((of("raypack"), of("obvhs")), (Kernel::ALL.len(), 4), "{rays}, {threads} threads");
+            assert_eq!((of("raypack"), of("obvhs")), (MODES, 4), "{rays}, {threads} threads");
         }
     }
     for row in rows {
@@ -70,7 +73,12 @@ fn json_on_standard_output_is_nothing_but_json() {
         .args(["--engines", "raypack", "--rays", "camera", "--threads", "1", "--json", "-"])
         .assert();
     let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
-    assert_eq!(report["rows"].as_array().unwrap().len(), Kernel::ALL.len());
+    let modes: Vec<&str> =
+        report["rows"].as_array().unwrap().iter().map(|row| row["mode"].as_str().unwrap()).collect();
+    let kernels = Kernel::ALL.iter().map(|kernel| kernel.name());
+    assert_eq!(modes, kernels.chain(["auto"]).collect::<Vec<_>>());
+    let beams = report["beams"].as_array().unwrap();
+    assert!(beams[0]["rays"] == "camera" && beams[0]["counts"]["nodes"].as_u64() > Some(0), "{beams:?}");
 }
 
 #[test]
@@ -84,7 +92,7 @@ fn every_accuracy_can_be_raced() {
         let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
         assert_eq!(report["header"]["accuracy"], accuracy);
         let rows = report["rows"].as_array().unwrap();
-        assert!(rows.len() == 2 * Kernel::ALL.len() && rows.iter().all(|row| row["accuracy"] == accuracy));
+        assert!(rows.len() == 2 * MODES && rows.iter().all(|row| row["accuracy"] == accuracy));
     }
     let run = bench(&model).args(["--engines", "raypack", "--rays", "camera", "--threads", "1"]).assert();
     run.success().stdout(predicate::str::contains("raypack's accuracy: watertight"));

@@ -11,8 +11,7 @@ pub const MAX_DEPTH: usize = 64;
 #[serde(deny_unknown_fields, default)]
 pub struct BuildParams {
     /// SAH cost of a step through an inner node. Only its ratio to `intersection_cost` counts.
-    /// Raising the ratio gives larger leaves and a smaller tree: 3 to 6 suits lone packets, 8 to 12
-    /// beams and streams.
+    /// Raising the ratio gives larger leaves and a smaller tree: 3 suits packets, 5 beams and memory.
     pub traversal_cost: f32,
     /// SAH cost of testing one triangle.
     pub intersection_cost: f32,
@@ -41,7 +40,7 @@ pub struct BuildParams {
 impl Default for BuildParams {
     fn default() -> Self {
         Self {
-            traversal_cost: 3.0,
+            traversal_cost: 5.0,
             intersection_cost: 1.0,
             empty_bonus: 0.2,
             min_leaf: 2,
