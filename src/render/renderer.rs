@@ -61,8 +61,7 @@ impl<'a> Renderer<'a> {
             Kernel::Packet4 => self.frame_of(Calls::<4>::PACKETS, camera, lighting, tiles_done),
             Kernel::Packet8 => self.frame_of(Calls::<8>::PACKETS, camera, lighting, tiles_done),
             Kernel::Packet16 => self.frame_of(Calls::<16>::PACKETS, camera, lighting, tiles_done),
-            // Camera rays have much in common; a stream would trace them one by one.
-            Kernel::Stream => self.frame_of(Calls::<1>::PACKETS, camera, lighting, tiles_done),
+            Kernel::Stream => self.frame_of(Calls::STREAM, camera, lighting, tiles_done),
             Kernel::Tile => self.frame_of(Calls::TILES, camera, lighting, tiles_done),
         }
     }

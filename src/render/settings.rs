@@ -93,7 +93,7 @@ impl FromStr for Size {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tuning {
-    /// Rays that are traced together: 1, 4, 8, 16 or 256. With 256, the squares of a picture
+    /// Rays that are traced together: 1, 4, 8, 16, 64 or 256. 64 are a stream, each ray alone. With 256, the squares of a picture
     /// go together where that is quicker, and by packets of 16 elsewhere, found out while rendering.
     #[serde(with = "packet_width")]
     pub packet: Kernel,

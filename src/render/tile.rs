@@ -5,8 +5,9 @@ use super::order::Tile;
 use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
+use crate::geometry::{Hit, Ray};
 use crate::scene::View;
-use crate::traverse::{Accel, Dispatch, HitPacket, PacketWidth, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -44,6 +45,39 @@ where
             }
         },
     };
+}
+
+impl Calls<1> {
+    /// All rays of a square in one stream.
+    pub const STREAM: Self = Self {
+        intersect: |_, accel, rays, active, hits| {
+            let mut found = [Hit::MISS; BATCH];
+            let found = &mut found[..rays.len()];
+            accel.intersect_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
+            for (packet, hit) in hits.iter_mut().zip(found) {
+                *packet = HitPacket::of_hit(hit);
+            }
+        },
+        occluded: |_, accel, rays, active, occluded| {
+            let mut found = [false; BATCH];
+            let found = &mut found[..rays.len()];
+            accel.occluded_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
+            for (lanes, &found) in occluded.iter_mut().zip(&*found) {
+                *lanes = u32::from(found);
+            }
+        },
+    };
+}
+
+/// Rays one by one; those that do not count look for nothing.
+fn unpacked(rays: &[RayPacket<1>], active: &[u32]) -> [Ray; BATCH] {
+    let mut all = [RayPacket::<1>::empty().get(0); BATCH];
+    for ((ray, packet), &active) in all.iter_mut().zip(rays).zip(active) {
+        if active != 0 {
+            *ray = packet.get(0);
+        }
+    }
+    all
 }
 
 impl Calls<16> {

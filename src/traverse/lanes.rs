@@ -122,6 +122,15 @@ impl<const W: usize> HitPacket<W> {
     }
 }
 
+impl HitPacket<1> {
+    /// One hit as a packet.
+    pub fn of_hit(hit: &Hit) -> Self {
+        let Hit { t, u, v, primitive, normal } = *hit;
+        let normal = normal.to_array().map(|coordinate| [coordinate]);
+        Self { t: [t], u: [u], v: [v], primitive: [primitive], normal }
+    }
+}
+
 /// The widths that there are kernels for, and the vectors that they use: implemented for
 /// `RayPacket<1>`, `<4>`, `<8>` and `<16>`.
 pub trait PacketWidth<const W: usize> {
