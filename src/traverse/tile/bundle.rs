@@ -5,6 +5,12 @@ use crate::simd::Lanes;
 
 /// A beam's rays, and what they have found.
 pub trait Bundle<L: Lanes<16>> {
+    /// The work after which a tile is given up, in steps of about one upper node: some times what a tile
+    /// takes whose rays are worth tracing together. Rays that are not, because each packet's go all over
+    /// the place, or because there are many triangles between one ray and the next, would meet every
+    /// triangle in a packet's window.
+    const PATIENCE: u32;
+
     /// The depth beyond which no ray of each packet looks for anything any more.
     fn reach(&self) -> L;
 

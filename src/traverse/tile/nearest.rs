@@ -138,6 +138,10 @@ where
     T: Tree,
     M: Mode,
 {
+    // Half of this lost up to 7 % in interiors, and twice as much gained 3 % there and lost 10 % among small
+    // triangles.
+    const PATIENCE: u32 = 5120;
+
     #[inline(always)]
     fn reach(&self) -> L {
         L::load(&self.reach)

@@ -6,15 +6,11 @@ use super::beam::{Beam, PACKETS};
 use super::bundle::Bundle;
 use super::outline::{Block, Window};
 use super::probe::Probe;
+use crate::geometry::triangle::Triangle;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Mask};
+use crate::simd::{Lanes, Mask, prefetch};
 use crate::traverse::stack::Stack;
 use crate::traverse::walk::Interval;
-
-/// The work after which a tile is given up: some four times what a tile takes whose rays are worth
-/// tracing together. Rays that are not, because each packet's go all over the place, or because there are
-/// many triangles between one ray and the next, would meet every triangle in a packet's window.
-const WORK: u32 = 2560;
 
 /// The work of a block, of culling a triangle for packets, and of a packet's test, in steps of about one
 /// upper node.
@@ -95,7 +91,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
             // Where it does not pay, each packet goes on alone from the start, with what was found as its
             // bound.
             self.work += nodes;
-            if self.work > WORK {
+            if self.work > B::PATIENCE {
                 let rest = Interval { tmin: start.tmin, tmax: bundle.reach().min(start.tmax) };
                 go_alone(bundle, &rest, start.live().bits(), 0, probe);
                 return;
@@ -133,9 +129,17 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
         let mut window = self.window;
         (window.nearest, window.farthest) = (interval.tmin, interval.tmax);
         let all = union(&window, L::mask_from_bits(live), self.beam.spread.blur::<PARALLEL>());
-        for primitives in page.chunks(16) {
-            if self.work > WORK {
+        let mut blocks = page.chunks(16);
+        let mut next = blocks.next();
+        while let Some(primitives) = next {
+            if self.work > B::PATIENCE {
                 return;
+            }
+            next = blocks.next();
+            for &primitive in next.unwrap_or_default() {
+                let triangle = &raw const *self.tree.triangle(primitive);
+                prefetch(triangle);
+                prefetch(triangle.cast::<u8>().wrapping_add(size_of::<Triangle>() - 1));
             }
             self.work += BLOCK_WORK;
 
