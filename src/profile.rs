@@ -5,7 +5,7 @@
 //! for a setting without effect.
 
 use crate::error::{Error, Result};
-use crate::kdtree::BuildParams;
+use crate::kdtree::{BuildParams, Preset};
 use crate::render::Tuning;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -76,7 +76,8 @@ impl Profile {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self> {
-        let profile: Self = toml::from_str(text).map_err(|error| Error::toml(path, text, &error))?;
+        let mut profile: Self = toml::from_str(text).map_err(|error| Error::toml(path, text, &error))?;
+        profile.build = on_preset(text, profile.build);
         profile.check().map_err(|error| Error::malformed(path, error.to_string()))?;
         Ok(profile)
     }
@@ -89,6 +90,18 @@ impl Profile {
         self.build.check()?;
         self.render.check()
     }
+}
+
+/// The build settings as written, and where nothing is written, as the preset that they name has it.
+fn on_preset(text: &str, written: BuildParams) -> BuildParams {
+    let merged = || {
+        let mut all = toml::Table::try_from(BuildParams::preset(written.preset)).ok()?;
+        let sections: toml::Table = toml::from_str(text).ok()?;
+        all.extend(sections.get("build")?.as_table()?.clone());
+        all.try_into().ok()
+    };
+    // The text has been read once: all but the standard preset need it once more.
+    if written.preset == Preset::Standard { written } else { merged().unwrap_or(written) }
 }
 
 #[cfg(test)]
@@ -119,6 +132,14 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_out_is_as_the_preset_has_it() {
+        let text = "[build]\npreset = \"best\"\nmin_leaf = 5\n[render]\npacket = 4\n";
+        let profile = Profile::parse(Path::new("p.toml"), text).expect("a profile");
+        assert_eq!(profile.build, BuildParams { min_leaf: 5, ..BuildParams::preset(Preset::Best) });
+        assert_eq!(profile.render.packet.width(), 4);
+    }
+
+    #[test]
     fn faults_name_the_file_and_the_key() {
         for (text, expected) in [
             ("[render]\ntiles = 3", "p.toml: line 2: unknown field `tiles`"),
@@ -131,6 +152,7 @@ mod tests {
             ("[render]\npin = 1", "p.toml: line 2: invalid type"),
             ("[build]\ntraversal_cost = -1.0", "p.toml: build.traversal_cost: must be"),
             ("[build]\nbins = 1", "p.toml: build.bins: must be"),
+            ("[build]\npreset = \"good\"", "p.toml: line 2: unknown variant `good`"),
             ("render", "p.toml: line 1: "),
         ] {
             let message = Profile::parse(Path::new("p.toml"), text).expect_err(text).to_string();

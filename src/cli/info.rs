@@ -1,11 +1,11 @@
 //! `raypack info MODEL`: what is in a model, and what its tree is like.
 
 use super::model::{Model, Scene, SceneReport};
+use super::options::BuildOptions;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, grouped};
 use crate::error::{Error, Result};
 use crate::kdtree::TreeStats;
 use crate::mesh::{Colors, Mesh};
-use crate::profile::{self, Profile};
 use crate::simd::Isa;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -18,9 +18,8 @@ pub struct Args {
     /// Prove that the tree is whole: every triangle is found in every leaf that it overlaps
     #[arg(long)]
     validate: bool,
-    /// Settings for building: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     json: Json,
 }
@@ -67,9 +66,9 @@ struct Memory {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     args.json.check()?;
-    let scene = Model::read(&args.model)?.build(&profile.build, isa)?;
+    let scene = Model::read(&args.model)?.build(&args.build, &profile.build, isa)?;
     if args.validate {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
         scene.accel.tree().validate().map_err(fault)?;

@@ -3,13 +3,13 @@
 mod report;
 
 use super::model::{Model, Scene};
-use super::options::{AccuracyOption, as_option};
+use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::mesh::generate::plant;
-use crate::profile::{self, Profile};
+use crate::profile::Profile;
 use crate::render::{RenderSettings, Renderer, Size, Tuning};
 use crate::scene::{Camera, Lighting, Orbit};
 use crate::simd::Isa;
@@ -60,9 +60,8 @@ pub struct Args {
     /// Side of a tile in pixels [default: the profile's]
     #[arg(long, value_name = "PIXELS")]
     tile: Option<u32>,
-    /// Settings for building and rendering: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
     /// Leave out the shadows
@@ -88,7 +87,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     // Everything that can be wrong with the options, before any work.
     let isa = Isa::from_env()?;
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
@@ -96,11 +95,11 @@ pub fn run(args: &Args) -> Result<()> {
     let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
     args.outputs.check(args.orbit, &others)?;
     args.json.check()?;
-    info!("profile {}, instruction set {isa}", args.profile);
+    info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
     let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
-    let mut scene = model.build(&profile.build, isa)?;
+    let mut scene = model.build(&args.build, &profile.build, isa)?;
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
@@ -122,7 +121,7 @@ pub fn run(args: &Args) -> Result<()> {
         Ok::<(), Error>(())
     })?;
 
-    let report = Report::new(&scene, renderer.settings(), &args.profile, shots);
+    let report = Report::new(&scene, renderer.settings(), args.build.name(), shots);
     args.json.give(&report.text(&scene), &report)
 }
 

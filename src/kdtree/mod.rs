@@ -4,9 +4,11 @@
 //! leaves, and the triangles of a leaf. How nodes lie in memory is this room's own business.
 
 mod build;
+mod memory;
 mod node;
 mod pages;
 mod params;
+mod preset;
 mod sah;
 mod scale;
 mod stats;
@@ -15,6 +17,7 @@ mod validate;
 pub use build::BuildProgress;
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub use preset::Preset;
 pub use scale::{Scale, exponent};
 pub use stats::TreeStats;
 
@@ -23,6 +26,7 @@ use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
 use glam::Vec3;
+use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
 
 /// What a traversal kernel asks of a tree.
@@ -69,6 +73,8 @@ pub struct KdTree {
     bounds: Aabb,
     scale: Scale,
     params: BuildParams,
+    /// The most memory that the build took, in bytes.
+    build_peak: usize,
 }
 
 impl KdTree {
@@ -81,10 +87,22 @@ impl KdTree {
     /// uses is not finite, or a parameter makes no sense.
     pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
         params.check()?;
+        let ledger = Ledger::default();
         let (triangles, bounds, scale) = gather(mesh)?;
-        let build::Built { nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        ledger.add(bytes_of(&triangles));
+        let build::Built { nodes, references } = build::build(&triangles, bounds, params, &ledger, progress)?;
         let pages = pages::Pages::cut(&nodes, &references, params.page);
-        Ok(Self { nodes, references, pages, triangles, bounds, scale, params: params.clone() })
+        ledger.add(pages.bytes());
+        Ok(Self {
+            nodes,
+            references,
+            pages,
+            triangles,
+            bounds,
+            scale,
+            params: params.clone(),
+            build_peak: ledger.peak(),
+        })
     }
 
     /// The box around all triangles, in the mesh's coordinates.
@@ -97,6 +115,11 @@ impl KdTree {
     #[inline(always)]
     pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
+    }
+
+    /// The most bytes that the build's arrays held, the tree's own among them.
+    pub fn build_peak(&self) -> usize {
+        self.build_peak
     }
 
     /// The settings that it was built with.

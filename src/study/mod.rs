@@ -9,5 +9,6 @@ pub mod bench;
 pub mod peers;
 pub mod rays;
 pub mod reference;
+pub mod resident;
 pub(crate) mod text;
 pub mod views;

@@ -17,6 +17,7 @@
 //! slower than its best in a qualifying run are dropped unless [`Pace::all_modes`] is set.
 
 pub mod agreement;
+pub mod build;
 #[cfg(feature = "peers")]
 pub(super) mod embree;
 pub(super) mod engine;

@@ -38,6 +38,11 @@ impl Ours {
         Self { accel, build_seconds, bytes }
     }
 
+    /// Seconds that the build took.
+    pub fn build_seconds(&self) -> f64 {
+        self.build_seconds
+    }
+
     /// The built tree.
     pub fn accel(&self) -> &Accel {
         &self.accel
