@@ -5,7 +5,8 @@
 //! for a setting without effect.
 
 use crate::error::{Error, Result};
-use crate::kdtree::BuildParams;
+use crate::geometry::Accuracy;
+use crate::kdtree::{BuildParams, Preset};
 use crate::render::Tuning;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -29,6 +30,70 @@ pub struct Profile {
     pub build: BuildParams,
     /// How frames are made.
     pub render: Tuning,
+    /// How these settings were found, if `raypack tune` did: for people to read, without any effect.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tuned: Option<Tuned>,
+}
+
+/// What a search for settings was about and what it measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Tuned {
+    /// The model.
+    pub model: String,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Where it was seen from.
+    pub cameras: Vec<String>,
+    /// The size of frames.
+    pub size: String,
+    /// What was timed: frames, or kinds of ray.
+    pub loads: Vec<String>,
+    /// What should be least.
+    pub goal: String,
+    /// The machine's processor.
+    pub processor: String,
+    /// How many threads traced.
+    pub threads: usize,
+    /// The instruction set.
+    pub isa: String,
+    /// How hits were decided.
+    pub accuracy: Accuracy,
+    /// The engine's version.
+    pub raypack: String,
+    /// When it was, in UTC.
+    pub date: String,
+    /// What random rays hung on.
+    pub seed: u64,
+    /// How long the search took.
+    pub seconds: f64,
+    /// What the settings take beside those that the search started from: least, middle and greatest of the
+    /// pairs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<[f64; 3]>,
+    /// What was tried, in order.
+    pub steps: Vec<TunedStep>,
+}
+
+/// A candidate beside what was best when it was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TunedStep {
+    /// The setting that was changed.
+    pub setting: String,
+    /// Its value before.
+    pub from: f64,
+    /// The value that was tried.
+    pub value: f64,
+    /// What it took beside what was best: the middle of the pairs.
+    pub time: f64,
+    /// The least of the pairs.
+    pub low: f64,
+    /// The greatest.
+    pub high: f64,
+    /// What the SAH says.
+    pub predicted: f64,
+    /// Whether it became the best.
+    pub accepted: bool,
 }
 
 impl Profile {
@@ -76,9 +141,15 @@ impl Profile {
     }
 
     fn parse(path: &Path, text: &str) -> Result<Self> {
-        let profile: Self = toml::from_str(text).map_err(|error| Error::toml(path, text, &error))?;
+        let mut profile: Self = toml::from_str(text).map_err(|error| Error::toml(path, text, &error))?;
+        profile.build = on_preset(text, profile.build);
         profile.check().map_err(|error| Error::malformed(path, error.to_string()))?;
         Ok(profile)
+    }
+
+    /// The profile as a file's text.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("numbers, texts and tables")
     }
 
     /// Checks that every value makes sense.
@@ -89,6 +160,18 @@ impl Profile {
         self.build.check()?;
         self.render.check()
     }
+}
+
+/// The build settings as written, and where nothing is written, as the preset that they name has it.
+fn on_preset(text: &str, written: BuildParams) -> BuildParams {
+    let merged = || {
+        let mut all = toml::Table::try_from(BuildParams::preset(written.preset)).ok()?;
+        let sections: toml::Table = toml::from_str(text).ok()?;
+        all.extend(sections.get("build")?.as_table()?.clone());
+        all.try_into().ok()
+    };
+    // The text has been read once: all but the standard preset need it once more.
+    if written.preset == Preset::Standard { written } else { merged().unwrap_or(written) }
 }
 
 #[cfg(test)]
@@ -119,6 +202,14 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_out_is_as_the_preset_has_it() {
+        let text = "[build]\npreset = \"best\"\nmin_leaf = 5\n[render]\npacket = 4\n";
+        let profile = Profile::parse(Path::new("p.toml"), text).expect("a profile");
+        assert_eq!(profile.build, BuildParams { min_leaf: 5, ..BuildParams::preset(Preset::Best) });
+        assert_eq!(profile.render.packet.width(), 4);
+    }
+
+    #[test]
     fn faults_name_the_file_and_the_key() {
         for (text, expected) in [
             ("[render]\ntiles = 3", "p.toml: line 2: unknown field `tiles`"),
@@ -131,6 +222,7 @@ mod tests {
             ("[render]\npin = 1", "p.toml: line 2: invalid type"),
             ("[build]\ntraversal_cost = -1.0", "p.toml: build.traversal_cost: must be"),
             ("[build]\nbins = 1", "p.toml: build.bins: must be"),
+            ("[build]\npreset = \"good\"", "p.toml: line 2: unknown variant `good`"),
             ("render", "p.toml: line 1: "),
         ] {
             let message = Profile::parse(Path::new("p.toml"), text).expect_err(text).to_string();

@@ -109,6 +109,8 @@ fn bad_options_are_one_line_and_leave_no_report() {
         ("--camera", "eye=1", "--camera"),
         ("--accuracy", "precise", "--accuracy: \"precise\""),
         ("--profile", "no-such-profile", "no-such-profile"),
+        ("--preset", "quick", "--preset: \"quick\" is not one of preview, standard, best"),
+        ("--memory", "1KiB", "--memory: the model takes"),
     ] {
         let mut command = Command::cargo_bin("raypack").unwrap();
         let run = command.arg("bench").arg(&model).args([option, value]).arg("--json").arg(&file).assert();
@@ -116,6 +118,50 @@ fn bad_options_are_one_line_and_leave_no_report() {
             .code(1)
             .stderr(predicate::str::contains(said).and(predicate::str::is_match("^[^\n]+\n$").unwrap()));
         assert!(!file.exists());
+    }
+}
+
+#[test]
+fn builds_are_measured_in_every_preset() {
+    let (folder, model) = model();
+    let file = folder.path().join("report.json");
+    let profile = folder.path().join("mine.toml");
+    fs::write(&profile, "[build]\npreset = \"preview\"\nmin_leaf = 3\n").unwrap();
+    let run = bench(&model)
+        .args(["--build", "--build-rounds", "2", "--engines", "raypack,obvhs", "--rays", "camera,ao"])
+        .arg("--profile")
+        .arg(&profile)
+        .arg("--json")
+        .arg(&file)
+        .assert();
+    run.success().stdout(predicate::str::contains("Mtris/s").and(predicate::str::contains("camera steps")));
+    let report: Value = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    assert_eq!(report["header"]["triangles"], 6);
+    let rows = report["rows"].as_array().unwrap();
+    let modes = |engine: &str| -> Vec<&str> {
+        let of_engine = rows.iter().filter(|row| row["engine"] == engine);
+        of_engine.map(|row| row["mode"].as_str().unwrap()).collect()
+    };
+    assert_eq!(modes("raypack"), ["preview", "standard", "best", "profile"]);
+    assert_eq!(modes("obvhs").len(), 4);
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} of {row}"));
+        assert!(0.0 < number("low") && number("low") <= number("seconds"), "{row}");
+        assert!(number("seconds") <= number("high") && number("rounds") == 2.0, "{row}");
+        assert!(number("mtriangles_per_s") > 0.0 && number("bytes_per_triangle") > 0.0, "{row}");
+        let rays = row["rays"].as_array().unwrap();
+        assert_eq!(rays.len(), 2, "{row}");
+        for rate in rays {
+            assert!(rate["mrays_per_s"].as_f64().unwrap() > 0.0, "{row}");
+            assert_eq!(rate["tests"].is_number(), row["engine"] == "raypack", "{row}");
+        }
+        if row["engine"] == "raypack" {
+            assert!(number("counted_peak_bytes") <= number("announced_peak_bytes"), "{row}");
+            assert!(number("counted_peak_bytes") >= number("bytes") && number("sah_cost") > 0.0, "{row}");
+        }
+    }
+    for agreement in report["agreements"].as_array().unwrap() {
+        assert_eq!(agreement["disagreements"], 0, "{agreement}");
     }
 }
 

@@ -1,12 +1,11 @@
 //! `raypack accuracy MODEL`: what accuracy costs in time.
 
 use super::model::Model;
-use super::options::as_option;
+use super::options::{BuildOptions, as_option};
 use super::outputs::same_file;
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::files::check_writable;
-use crate::profile::{self, Profile};
 use crate::render::Tuning;
 use crate::scene::Camera;
 use crate::simd::Isa;
@@ -64,9 +63,8 @@ pub struct Args {
     /// Pick the most accurate setting that renders a frame in this time, such as 33ms or 0.5s
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     within: Option<String>,
-    /// Settings for building and rendering: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     /// Rounds of each race at most; its middle round is reported
     #[arg(long, default_value_t = 9)]
     rounds: usize,
@@ -128,7 +126,7 @@ fn options(args: &Args) -> Result<Options> {
         }
     };
     let most = samples.iter().max().copied().unwrap_or(1);
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     let tuning = Tuning {
         threads: args.threads.unwrap_or(profile.render.threads),
         pin: args.pin || profile.render.pin,

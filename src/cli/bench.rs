@@ -1,12 +1,12 @@
 //! `raypack bench MODEL`: rays per second, beside Embree and obvhs.
 
 use super::model::Model;
-use super::options::AccuracyOption;
+use super::options::{AccuracyOption, BuildOptions};
 use super::report::Json;
 use crate::error::{Error, Result};
-use crate::profile::{self, Profile};
 use crate::scene::Camera;
 use crate::simd::Isa;
+use crate::study::bench::build::run as bench_builds;
 use crate::study::bench::{EngineName, Options, Pace, hardware_threads, run as bench};
 use crate::study::rays::RayKind;
 use std::io::IsTerminal;
@@ -22,6 +22,13 @@ use std::path::PathBuf;
 pub struct Args {
     /// The model: .obj or .ply
     model: PathBuf,
+    /// Measure builds: time, memory and the quality of the trees, every preset beside Embree low, medium and
+    /// high and obvhs, reading the file apart; rays are then traced in each with all threads
+    #[arg(long = "build")]
+    builds: bool,
+    /// How often each tree is built with --build; the middle one is reported
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    build_rounds: usize,
     /// The camera, as eye=x,y,z;at=x,y,z;up=x,y,z;fov=DEG or a TOML file; without it the model is framed
     #[arg(long)]
     camera: Option<String>,
@@ -34,12 +41,14 @@ pub struct Args {
     /// Engines
     #[arg(long, value_delimiter = ',', default_value = "raypack,embree,obvhs")]
     engines: Vec<String>,
+    /// raypack's modes: single, packet4, packet8, packet16, stream, tile, auto; all of them if none is named
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    modes: Vec<String>,
     /// Race with one thread, and with this many; 0 for all processors
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// Settings for building: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
     /// Rounds of each race at most; its middle round is reported
@@ -66,14 +75,19 @@ pub struct Args {
 /// # Errors
 /// An option makes no sense, the model cannot be read, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
-    let options = options(args)?;
+    let mut options = options(args)?;
     args.json.check()?;
     let model = Model::read(&args.model)?;
+    args.build.fit(&model.mesh, &mut options.build)?;
     let mut progress = |line: &str| {
         if std::io::stderr().is_terminal() {
             eprintln!("{line} …");
         }
     };
+    if args.builds {
+        let report = bench_builds(&model.name, &model.mesh, &options, args.build_rounds, &mut progress)?;
+        return args.json.give(&report.to_string(), &report);
+    }
     let report = bench(&model.name, &model.mesh, &options, &mut progress)?;
     args.json.give(&report.to_string(), &report)
 }
@@ -86,12 +100,16 @@ fn options(args: &Args) -> Result<Options> {
     if args.rounds == 0 {
         return Err(Error::option("--rounds", "0 rounds measure nothing"));
     }
+    if args.build_rounds == 0 {
+        return Err(Error::option("--build-rounds", "0 rounds measure nothing"));
+    }
     if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
         return Err(Error::option("--seconds", format!("{} is no time", args.seconds)));
     }
     Ok(Options {
         kinds: args.rays.iter().map(|name| name.parse::<RayKind>()).collect::<Result<_>>()?,
         engines: args.engines.iter().map(|name| name.parse::<EngineName>()).collect::<Result<_>>()?,
+        modes: args.modes.clone(),
         camera: args.camera.as_deref().map(Camera::parse).transpose()?,
         size: size(&args.size)?,
         threads: if most == 1 { vec![1] } else { vec![1, most] },
@@ -100,7 +118,7 @@ fn options(args: &Args) -> Result<Options> {
         isa: Isa::from_env()?,
         hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
         accuracy: args.accuracy.mode()?,
-        build: Profile::find(&args.profile)?.build,
+        build: args.build.profile()?.build,
     })
 }
 
@@ -146,6 +164,9 @@ mod tests {
             ("bench m.obj --size big", "--size"),
             ("bench m.obj --threads 5000", "--threads"),
             ("bench m.obj --rounds 0", "--rounds"),
+            ("bench m.obj --build --build-rounds 0", "--build-rounds"),
+            ("bench m.obj --preset quick", "--preset"),
+            ("bench m.obj --memory plenty", "--memory"),
             ("bench m.obj --seconds nan", "--seconds"),
             ("bench m.obj --rays camera,primary", "--rays"),
             ("bench m.obj --engines optix", "--engines"),

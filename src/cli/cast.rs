@@ -1,7 +1,7 @@
 //! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
 
 use super::model::{Model, Scene, SceneReport};
-use super::options::{AccuracyOption, as_option};
+use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration, grouped};
@@ -10,7 +10,7 @@ use crate::batch::{Batch, Traced};
 use crate::error::{Error, Result};
 use crate::files::check_writable;
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::profile::{self, Profile};
+use crate::profile::Profile;
 use crate::render::{RayCount, Tuning};
 use crate::simd::Isa;
 use crate::traverse::Kernel;
@@ -65,9 +65,8 @@ pub struct Args {
     /// Rays that are traced together: 1, 4, 8, 16 or 256 [default: what is quickest with a sample of the rays]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
-    /// Settings for building: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     json: Json,
 }
@@ -99,7 +98,7 @@ struct Report<'a> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     let accuracy = args.accuracy.mode()?;
     let kernel = args.kernel()?;
     let threads = args.threads(&profile)?;
@@ -110,7 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let rays = read_rays(&args.rays)?;
     let rays_read_seconds = start.elapsed().as_secs_f64();
-    let mut scene = Model::read(&args.scene)?.build(&profile.build, isa)?;
+    let mut scene = Model::read(&args.scene)?.build(&args.build, &profile.build, isa)?;
     scene.accel.set_accuracy(accuracy);
 
     let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
@@ -118,7 +117,7 @@ pub fn run(args: &Args) -> Result<()> {
     let report = Report {
         engine: ENGINE,
         scene: scene.report(),
-        profile: &args.profile,
+        profile: args.build.name(),
         isa: isa.name(),
         accuracy,
         packet: traced.kernel.width(),

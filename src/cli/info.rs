@@ -1,12 +1,17 @@
 //! `raypack info MODEL`: what is in a model, and what its tree is like.
 
+use super::histogram::{bars, decades};
 use super::model::{Model, Scene, SceneReport};
+use super::options::BuildOptions;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, grouped};
 use crate::error::{Error, Result};
+use crate::geometry::Hit;
 use crate::kdtree::TreeStats;
-use crate::mesh::{Colors, Mesh};
-use crate::profile::{self, Profile};
+use crate::mesh::{Colors, Mesh, Shapes};
+use crate::scene::Camera;
 use crate::simd::Isa;
+use crate::study::bench::build::count::{Counts, count};
+use crate::study::rays::{RayKind, RaySets, Setup};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -18,9 +23,8 @@ pub struct Args {
     /// Prove that the tree is whole: every triangle is found in every leaf that it overlaps
     #[arg(long)]
     validate: bool,
-    /// Settings for building: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     json: Json,
 }
@@ -32,6 +36,9 @@ struct Report<'a> {
     scene: SceneReport<'a>,
     colors: ColorReport<'a>,
     memory: Memory,
+    shapes: Shapes,
+    /// What a random ray through the bounds did, on average.
+    random_rays: Counts,
     /// `true` if the tree was validated; it is an error if it is not valid.
     validated: bool,
 }
@@ -67,9 +74,9 @@ struct Memory {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     args.json.check()?;
-    let scene = Model::read(&args.model)?.build(&profile.build, isa)?;
+    let scene = Model::read(&args.model)?.build(&args.build, &profile.build, isa)?;
     if args.validate {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
         scene.accel.tree().validate().map_err(fault)?;
@@ -79,9 +86,22 @@ pub fn run(args: &Args) -> Result<()> {
         scene: scene.report(),
         colors: colors(&scene.model.mesh),
         memory: memory(&scene.model.mesh, &scene.tree),
+        shapes: Shapes::of(&scene.model.mesh),
+        random_rays: random_rays(&scene),
         validated: args.validate,
     };
     args.json.give(&text(&scene, &report), &report)
+}
+
+/// Random rays are as many as a square image of this side has pixels.
+const RANDOM_SIDE: u32 = 256;
+
+/// Traces random rays through the bounds and counts what they do.
+fn random_rays(scene: &Scene) -> Counts {
+    let bounds = scene.accel.bounds();
+    let setup = Setup::new(Camera::framing(&bounds, 1.0), RANDOM_SIDE, bounds, 1);
+    let sets = RaySets::new(setup, &scene.model.mesh, |rays| vec![Hit::MISS; rays.len()]);
+    count(&scene.accel, &sets.rays(RayKind::Random))
 }
 
 fn colors(mesh: &Mesh) -> ColorReport<'_> {
@@ -137,10 +157,33 @@ fn text(scene: &Scene, report: &Report<'_>) -> String {
     lines.add(
         "a ray",
         format!(
-            "that meets the bounds is expected to take {:.1} steps, {:.1} leaves and {:.1} triangle tests",
+            "that meets the bounds is expected to take {:.1} steps, {:.1} leaves and {:.1} triangle tests, were \
+             there nothing to hit",
             tree.expected_steps, tree.expected_leaves, tree.expected_tests
         ),
     );
+    let random = &report.random_rays;
+    lines.add(
+        "",
+        format!(
+            "and random ones that begin inside took {:.1}, {:.1} and {:.1} up to their hits",
+            random.steps, random.leaves, random.tests
+        ),
+    );
+    let numbered = |first: usize| move |i: usize| (i + first).to_string();
+    bars(&mut lines, "leaf size", "leaves", &tree.leaf_histogram, numbered(0));
+    bars(&mut lines, "depth", "leaves", &tree.depth_histogram, numbered(0));
+    bars(&mut lines, "in leaves", "triangles", &tree.duplication_histogram, numbered(1));
+    let shapes = &report.shapes;
+    let [by_area, by_aspect] =
+        [shapes.by_area, shapes.by_aspect].map(|counts| counts.map(|count| count as usize));
+    bars(&mut lines, "area", "triangles, beside the largest", &by_area, |i| decades(-(i as i32)));
+    bars(&mut lines, "aspect", "triangles, longest edge beside height", &by_aspect, |i| {
+        decades(i as i32 + 1)
+    });
+    if shapes.without_area > 0 {
+        lines.add("", format!("{} without area", counted(shapes.without_area, "triangle")));
+    }
     let bounds = scene.accel.bounds();
     let (low, high, extent) = (bounds.min, bounds.max, bounds.extent());
     lines.add(

@@ -7,6 +7,7 @@ mod accuracy;
 mod bench;
 mod cast;
 mod generate;
+mod histogram;
 mod info;
 mod model;
 mod options;
@@ -14,6 +15,7 @@ mod outputs;
 mod progress;
 mod render;
 mod report;
+mod tune;
 
 use clap::{ArgAction, Parser, Subcommand};
 use std::io::IsTerminal;
@@ -39,6 +41,7 @@ enum Command {
     Accuracy(accuracy::Args),
     Cast(cast::Args),
     Generate(generate::Args),
+    Tune(tune::Args),
 }
 
 /// Runs the command that the process's arguments name.
@@ -52,6 +55,7 @@ pub fn main() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(args),
         Command::Cast(args) => cast::run(args),
         Command::Generate(args) => generate::run(args),
+        Command::Tune(args) => tune::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,5 +1,6 @@
 //! From a model's name to a tree: read or generated, and built.
 
+use super::options::BuildOptions;
 use super::progress::{Bar, watch};
 use super::report::{Lines, bytes, duration, grouped};
 use crate::error::Result;
@@ -7,6 +8,7 @@ use crate::kdtree::{BuildParams, BuildProgress, TreeStats};
 use crate::mesh::generate::plant;
 use crate::mesh::{self, Mesh, ReadReport};
 use crate::simd::Isa;
+use crate::study::resident::Resident;
 use crate::traverse::Accel;
 use serde::Serialize;
 use std::path::Path;
@@ -47,18 +49,28 @@ impl Model {
     }
 
     /// Builds its tree.
-    pub fn build(self, params: &BuildParams, isa: Isa) -> Result<Scene> {
+    ///
+    /// # Errors
+    /// As [`KdTree::build`](crate::kdtree::KdTree::build), or the memory that is given does not do.
+    pub fn build(self, options: &BuildOptions, params: &BuildParams, isa: Isa) -> Result<Scene> {
+        let mut params = params.clone();
+        options.fit(&self.mesh, &mut params)?;
+        let announced = params.peak_bytes(self.mesh.triangles.len());
+        info!("the build will take {} at most", bytes(announced as u64));
+        let resident = Resident::start();
         let start = Instant::now();
         let progress = BuildProgress::default();
         let accel = watch(
             "building",
             || progress.fraction(),
-            || Accel::build_with_progress(&self.mesh, params, &progress),
+            || Accel::build_with_progress(&self.mesh, &params, &progress),
         )?;
         let build_seconds = start.elapsed().as_secs_f64();
         info!("built the tree in {}", duration(build_seconds));
+        let resident = resident.and_then(|resident| resident.rise());
+        let memory = BuildMemory { announced, counted: accel.tree().build_peak(), resident };
         let tree = accel.stats();
-        Ok(Scene { model: self, accel: accel.with_isa(isa), tree, build_seconds })
+        Ok(Scene { memory, model: self, accel: accel.with_isa(isa), tree, build_seconds })
     }
 }
 
@@ -72,6 +84,19 @@ pub struct Scene {
     pub tree: TreeStats,
     /// The time that the build took.
     pub build_seconds: f64,
+    /// The memory that the build took.
+    pub memory: BuildMemory,
+}
+
+/// Bytes that a build took beside the mesh, the tree among them.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct BuildMemory {
+    /// The most that it could have taken, as was known beforehand.
+    pub announced: usize,
+    /// The most that its arrays held.
+    pub counted: usize,
+    /// How far the process's memory has risen, where the system says.
+    pub resident: Option<u64>,
 }
 
 /// What reports say about a scene.
@@ -85,6 +110,7 @@ pub struct SceneReport<'a> {
     read_seconds: f64,
     read_report: Option<&'a ReadReport>,
     build_seconds: f64,
+    build_memory: BuildMemory,
     tree: &'a TreeStats,
 }
 
@@ -100,6 +126,7 @@ impl Scene {
             read_seconds: *seconds,
             read_report: report.as_ref(),
             build_seconds: self.build_seconds,
+            build_memory: self.memory,
             tree: &self.tree,
         }
     }
@@ -115,7 +142,18 @@ impl Scene {
         if !summary.is_empty() {
             lines.add("repaired", summary);
         }
-        lines.add("build", duration(self.build_seconds));
+        let BuildMemory { announced, counted, resident } = self.memory;
+        let resident = resident.map(|rise| format!(", the process rose by {}", bytes(rise)));
+        lines.add(
+            "build",
+            format!(
+                "{}; {} of memory at most, of {} announced{}",
+                duration(self.build_seconds),
+                bytes(counted as u64),
+                bytes(announced as u64),
+                resident.unwrap_or_default()
+            ),
+        );
         let tree = &self.tree;
         lines.add(
             "tree",

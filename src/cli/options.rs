@@ -1,7 +1,12 @@
 //! Options that several commands have.
 
+use super::report::bytes;
 use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
+use crate::kdtree::{BuildParams, Preset};
+use crate::mesh::Mesh;
+use crate::profile::{self, Profile};
+use tracing::info;
 
 /// `--accuracy`.
 #[derive(Clone, Debug, clap::Args)]
@@ -22,6 +27,92 @@ impl AccuracyOption {
     }
 }
 
+/// `--profile`, `--preset` and `--memory`: how a tree is built.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BuildOptions {
+    /// Settings for building and rendering: a name in profiles/ or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
+    profile: String,
+    /// How much time the build may take, in place of the profile's settings for it: preview builds in
+    /// about two thirds of the time a tree that is up to a third slower, best takes half as long again for
+    /// a few per cent
+    #[arg(long, value_name = "preview|standard|best")]
+    preset: Option<String>,
+    /// The memory that model and build may take, as 512MiB or 2GiB: the tree is made coarser to fit, and
+    /// where that does not do, it is refused before the build starts [default: no limit]
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<String>,
+}
+
+impl BuildOptions {
+    /// The name of the profile.
+    pub fn name(&self) -> &str {
+        &self.profile
+    }
+
+    /// The profile, with the preset's settings if one is named.
+    ///
+    /// # Errors
+    /// There is no such profile or preset, something in it makes no sense, or the memory is no size.
+    pub fn profile(&self) -> Result<Profile> {
+        self.limit()?;
+        let mut profile = Profile::find(&self.profile)?;
+        if let Some(preset) = &self.preset {
+            profile.build = BuildParams::preset(preset.parse::<Preset>()?);
+        }
+        Ok(profile)
+    }
+
+    /// Sees to it that a build stays within the memory given.
+    ///
+    /// # Errors
+    /// It cannot: how much it takes.
+    pub fn fit(&self, mesh: &Mesh, params: &mut BuildParams) -> Result<()> {
+        let Some(limit) = self.limit()? else { return Ok(()) };
+        let (model, before) = (mesh.bytes(), params.max_duplication);
+        if let Err(least) = params.fit(mesh.triangles.len(), limit.saturating_sub(model)) {
+            let message = format!(
+                "the model takes {} and the least tree that is worth building {} more: give {}MiB",
+                bytes(model as u64),
+                bytes(least as u64),
+                (model + least).div_ceil(1 << 20)
+            );
+            return Err(Error::option("--memory", message));
+        }
+        if params.max_duplication < before {
+            info!("max_duplication is {:.2} instead of {before}, to fit the memory", params.max_duplication);
+        }
+        Ok(())
+    }
+
+    /// The memory that model and build may take, in bytes.
+    pub fn limit(&self) -> Result<Option<usize>> {
+        self.memory.as_deref().map(parse_size).transpose()
+    }
+}
+
+/// `4096`, `512MiB`, `1.5 GiB`; MB and GB count by thousands.
+fn parse_size(text: &str) -> Result<usize> {
+    const UNITS: [(&str, f64); 9] = [
+        ("KiB", 1024.0),
+        ("MiB", 1_048_576.0),
+        ("GiB", 1_073_741_824.0),
+        ("TiB", 1_099_511_627_776.0),
+        ("KB", 1e3),
+        ("MB", 1e6),
+        ("GB", 1e9),
+        ("TB", 1e12),
+        ("B", 1.0),
+    ];
+    let trimmed = text.trim();
+    let with = |&(unit, factor): &(&str, f64)| Some((trimmed.strip_suffix(unit)?, factor));
+    let (number, factor) = UNITS.iter().find_map(with).unwrap_or((trimmed, 1.0));
+    match number.trim().parse::<f64>() {
+        Ok(size) if size >= 0.0 && size * factor < 1e18 => Ok((size * factor) as usize),
+        _ => Err(Error::option("--memory", format!("\"{text}\" is no size; write 512MiB or 2GiB"))),
+    }
+}
+
 /// A fault of the settings, named by the option instead of the profile's key.
 pub fn as_option(error: Error) -> Error {
     match error {
@@ -30,5 +121,62 @@ pub fn as_option(error: Error) -> Error {
             Error::Option { option, message }
         }
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::generate::shapes;
+    use clap::Parser;
+
+    #[derive(clap::Parser)]
+    struct Command {
+        #[command(flatten)]
+        build: BuildOptions,
+    }
+
+    fn options(line: &str) -> BuildOptions {
+        Command::try_parse_from(line.split(' ')).unwrap().build
+    }
+
+    #[test]
+    fn a_preset_replaces_the_build_settings() {
+        let profile = options("x --preset best").profile().unwrap();
+        assert_eq!(profile.build, BuildParams::preset(Preset::Best));
+        let message = options("x --preset quick").profile().unwrap_err().to_string();
+        assert!(message.starts_with("--preset: \"quick\" is not one of"), "{message}");
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        for (text, size) in [
+            ("4096", 4096),
+            ("12B", 12),
+            ("1.5 KiB", 1536),
+            ("512MiB", 512 << 20),
+            ("2GiB", 2 << 30),
+            ("3GB", 3_000_000_000),
+        ] {
+            assert_eq!(parse_size(text).unwrap(), size, "{text}");
+        }
+        for text in ["", "MiB", "-1", "1 parsec", "nan", "inf", "1e30"] {
+            let message = parse_size(text).unwrap_err().to_string();
+            assert!(message.starts_with("--memory: ") && !message.contains('\n'), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_says_what_would() {
+        let mesh = shapes::soup(5000, 1);
+        let params = BuildParams::default();
+        let message = options("x --memory 1MiB").fit(&mesh, &mut params.clone()).unwrap_err().to_string();
+        let enough = message.split("give ").nth(1).and_then(|rest| rest.split(',').next()).unwrap();
+        let mut fitted = params.clone();
+        options(&format!("x --memory {enough}")).fit(&mesh, &mut fitted).unwrap();
+        assert!(fitted.max_duplication < params.max_duplication);
+        let mut untouched = params.clone();
+        options("x").fit(&mesh, &mut untouched).unwrap();
+        assert_eq!(untouched, params);
     }
 }

@@ -26,6 +26,11 @@ impl Outputs {
         Aovs { depth: self.depth.is_some(), normal: self.normals.is_some() }
     }
 
+    /// The main picture's file.
+    pub fn picture(&self) -> &Path {
+        &self.output
+    }
+
     /// Finds out before any work whether all can be written: endings are known, folders writable,
     /// and no two of them (nor the scene, nor the report) are the same file.
     pub fn check(&self, frames: Option<u32>, others: &[&Path]) -> Result<()> {

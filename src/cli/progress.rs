@@ -26,6 +26,11 @@ impl Bar {
         Self(ProgressBar::new(STEPS).with_style(style).with_message(word.to_owned()))
     }
 
+    /// Changes what it says.
+    pub fn say(&self, words: &str) {
+        self.0.set_message(words.to_owned());
+    }
+
     /// Shows a part of 1.
     pub fn set(&self, fraction: f64) {
         self.0.set_position((fraction * STEPS as f64) as u64);

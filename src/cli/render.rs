@@ -1,18 +1,20 @@
 //! `raypack render [SCENE] -o out.png`: a still or a camera path.
 
+mod heat;
 mod report;
 
 use super::model::{Model, Scene};
-use super::options::{AccuracyOption, as_option};
+use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::mesh::generate::plant;
-use crate::profile::{self, Profile};
+use crate::profile::Profile;
 use crate::render::{RenderSettings, Renderer, Size, Tuning};
 use crate::scene::{Camera, Lighting, Orbit};
 use crate::simd::Isa;
+use crate::study::heat::Cost;
 use crate::traverse::Kernel;
 use report::{Report, Shot};
 use std::path::PathBuf;
@@ -54,17 +56,23 @@ pub struct Args {
     /// Keep each worker on one processor
     #[arg(long)]
     pin: bool,
-    /// Rays that are traced together: 1, 4, 8, 16 or 256 [default: the profile's]
+    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream) or 256 (a beam) [default: the profile's]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     /// Side of a tile in pixels [default: the profile's]
     #[arg(long, value_name = "PIXELS")]
     tile: Option<u32>,
-    /// Settings for building and rendering: a name in profiles/ or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
-    profile: String,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
+    /// Write what each pixel's ray costs instead of what it sees: .png in colours, .exr or .pfm as numbers
+    #[arg(
+        long,
+        value_name = "steps|tests|leaves|time",
+        conflicts_with_all = ["orbit", "samples", "depth", "normals"]
+    )]
+    heatmap: Option<String>,
     /// Leave out the shadows
     #[arg(long)]
     no_shadows: bool,
@@ -88,22 +96,26 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     // Everything that can be wrong with the options, before any work.
     let isa = Isa::from_env()?;
-    let profile = Profile::find(&args.profile)?;
+    let profile = args.build.profile()?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
     let orbit = args.orbit()?;
+    let heatmap = args.heatmap.as_deref().map(str::parse::<Cost>).transpose()?;
     let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
     args.outputs.check(args.orbit, &others)?;
     args.json.check()?;
-    info!("profile {}, instruction set {isa}", args.profile);
+    info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
     let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
-    let mut scene = model.build(&profile.build, isa)?;
+    let mut scene = model.build(&args.build, &profile.build, isa)?;
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
+    if let Some(cost) = heatmap {
+        return heat::run(&scene, camera, settings.size, cost, args.outputs.picture(), &args.json);
+    }
     let lighting = args.lighting(&camera, &scene);
     let renderer = Renderer::new(&scene.accel, &scene.model.mesh, settings)?;
 
@@ -122,7 +134,7 @@ pub fn run(args: &Args) -> Result<()> {
         Ok::<(), Error>(())
     })?;
 
-    let report = Report::new(&scene, renderer.settings(), &args.profile, shots);
+    let report = Report::new(&scene, renderer.settings(), args.build.name(), shots);
     args.json.give(&report.text(&scene), &report)
 }
 

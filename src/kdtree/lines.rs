@@ -111,10 +111,10 @@ pub struct Lines(Vec<Line>);
 impl Lines {
     /// Packs a tree whose references are [`counted`].
     pub fn pack(nodes: &[Node], bounds: &Aabb) -> Self {
-        let mut lines = Self(Vec::with_capacity(nodes.len() / 8));
-        lines.treelet(nodes, nodes[0], bounds, 0);
-        lines.0.shrink_to_fit();
-        lines
+        let empty = Line { planes: [f32::INFINITY; 8], exits: [0; 8] };
+        let mut lines = vec![empty; count(nodes, nodes[0])];
+        Treelets { nodes }.fill(&mut lines, 0, nodes[0], bounds, 0);
+        Self(lines)
     }
 
     /// The lines.
@@ -127,45 +127,61 @@ impl Lines {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.0[..])
     }
+}
 
-    /// Packs a subtree that begins `depth` treelets down; gives the number of its line.
-    fn treelet(&mut self, nodes: &[Node], root: Node, cell: &Aabb, depth: usize) -> usize {
-        let index = self.0.len();
-        let (line, below) = Line::of_treelet(nodes, root, cell);
-        self.0.push(line);
+/// How many lines a subtree takes.
+fn count(nodes: &[Node], root: Node) -> usize {
+    let mut level = vec![root];
+    let mut next = Vec::new();
+    let mut lines = 0;
+    // Breadth first, three levels at a time.
+    while !level.is_empty() {
+        lines += level.len();
+        for _ in 0..3 {
+            let inner = level.iter().filter(|node| !node.is_leaf());
+            next.extend(inner.flat_map(|node| [0, 1].map(|child| nodes[node.below() as usize + child])));
+            (level, next) = (next, level);
+            next.clear();
+        }
+        level.retain(|node| !node.is_leaf());
+    }
+    lines
+}
+
+/// A tree on its way into lines.
+struct Treelets<'a> {
+    nodes: &'a [Node],
+}
+
+impl Treelets<'_> {
+    /// Fills the first of `lines`, whose numbers begin at `first`, with a subtree that begins `depth`
+    /// treelets down; says how many it took.
+    fn fill(&self, lines: &mut [Line], first: usize, root: Node, cell: &Aabb, depth: usize) -> usize {
+        use rayon::prelude::*;
+        let (mut line, below) = Line::of_treelet(self.nodes, root, cell);
+        let mut taken = 1;
         if depth < PARALLEL_DEPTH {
-            use rayon::prelude::*;
-            let packed = below.into_par_iter().map(|(exit, node, cell)| {
-                let mut lines = Self::default();
-                lines.treelet(nodes, node, &cell, depth + 1);
-                (exit, lines)
-            });
-            for (exit, lines) in packed.collect::<Vec<_>>() {
-                let first = self.append(lines);
-                self.0[index].exits[exit] |= Exit::of_line(first).0;
+            let counts = below.par_iter().map(|(_, node, _)| count(self.nodes, *node)).collect::<Vec<_>>();
+            let (_, mut rest) = lines.split_at_mut(1);
+            let mut tasks = Vec::with_capacity(below.len());
+            for ((exit, node, cell), count) in below.into_iter().zip(counts) {
+                let (part, behind) = rest.split_at_mut(count);
+                rest = behind;
+                line.exits[exit] |= Exit::of_line(first + taken).0;
+                tasks.push((part, first + taken, node, cell));
+                taken += count;
             }
+            tasks.into_par_iter().for_each(|(part, first, node, cell)| {
+                self.fill(part, first, node, &cell, depth + 1);
+            });
         } else {
             for (exit, node, cell) in below {
-                let first = self.treelet(nodes, node, &cell, depth + 1);
-                self.0[index].exits[exit] |= Exit::of_line(first).0;
+                line.exits[exit] |= Exit::of_line(first + taken).0;
+                taken += self.fill(&mut lines[taken..], first + taken, node, &cell, depth + 1);
             }
         }
-        index
-    }
-
-    /// Appends lines that were packed on their own; gives the number that their first now has.
-    fn append(&mut self, lines: Self) -> usize {
-        let first = self.0.len();
-        self.0.extend(lines.0.into_iter().map(|mut line| {
-            for exit in &mut line.exits {
-                let leads_to_a_line = !Exit(*exit).is_leaf() && Exit(*exit).line() > 0;
-                if leads_to_a_line {
-                    *exit += Exit::of_line(first).0;
-                }
-            }
-            line
-        }));
-        first
+        lines[0] = line;
+        taken
     }
 }
 

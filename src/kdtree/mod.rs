@@ -5,9 +5,11 @@
 
 mod build;
 mod lines;
+mod memory;
 mod node;
 mod pages;
 mod params;
+mod preset;
 mod sah;
 mod scale;
 mod stats;
@@ -17,6 +19,7 @@ pub use build::BuildProgress;
 pub use lines::{Exit, Line};
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub use preset::Preset;
 pub use scale::{Scale, exponent};
 pub use stats::TreeStats;
 
@@ -25,6 +28,7 @@ use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
 use glam::Vec3;
+use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
 
 /// What a traversal kernel asks of a tree.
@@ -79,6 +83,8 @@ pub struct KdTree {
     bounds: Aabb,
     scale: Scale,
     params: BuildParams,
+    /// The most memory that the build took, in bytes.
+    build_peak: usize,
 }
 
 impl KdTree {
@@ -91,17 +97,35 @@ impl KdTree {
     /// uses is not finite, or a parameter makes no sense.
     pub fn build(mesh: &Mesh, params: &BuildParams, progress: Option<&BuildProgress>) -> Result<Self> {
         params.check()?;
+        let ledger = Ledger::default();
         let (triangles, bounds, scale) = gather(mesh)?;
-        let build::Built { mut nodes, references } = build::build(&triangles, bounds, params, progress)?;
+        ledger.add(bytes_of(&triangles));
+        let build::Built { mut nodes, references } =
+            build::build(&triangles, bounds, params, &ledger, progress)?;
         let pages = pages::Pages::cut(&nodes, &references, params.page);
-        let references = lines::counted(&mut nodes, &references);
+        ledger.add(pages.bytes());
+        let counted = lines::counted(&mut nodes, &references);
+        ledger.add(bytes_of(&counted));
+        ledger.sub(bytes_of(&references));
+        drop(references);
         let lines = lines::Lines::pack(&nodes, &bounds);
-        if references.len() > lines::MAX_RECORD || lines.all().len() > lines::MAX_LINE {
-            let message =
-                "its tree has more references than a tree can hold: raise traversal_cost in a profile";
+        ledger.add(lines.bytes());
+        if counted.len() > lines::MAX_RECORD || lines.all().len() > lines::MAX_LINE {
+            let message = "its tree has more references than a tree can hold: lower max_duplication or raise \
+                           traversal_cost in a profile";
             return Err(Error::Mesh(message.into()));
         }
-        Ok(Self { nodes, references, lines, pages, triangles, bounds, scale, params: params.clone() })
+        Ok(Self {
+            nodes,
+            references: counted,
+            lines,
+            pages,
+            triangles,
+            bounds,
+            scale,
+            params: params.clone(),
+            build_peak: ledger.peak(),
+        })
     }
 
     /// The box around all triangles, in the mesh's coordinates.
@@ -114,6 +138,11 @@ impl KdTree {
     #[inline(always)]
     pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
+    }
+
+    /// The most bytes that the build's arrays held, the tree's own among them.
+    pub fn build_peak(&self) -> usize {
+        self.build_peak
     }
 
     /// The settings that it was built with.

@@ -176,6 +176,7 @@ const PAGES_PER_TASK: usize = 512;
 mod tests {
     use super::*;
     use crate::kdtree::build::{self, Built};
+    use crate::kdtree::memory::Ledger;
     use crate::kdtree::{BuildParams, gather};
     use crate::mesh::generate::shapes;
 
@@ -209,7 +210,8 @@ mod tests {
     fn pages_hold_what_is_below_them() {
         let mesh = shapes::soup(5000, 1);
         let (triangles, bounds, _) = gather(&mesh).expect("triangles");
-        let tree = build::build(&triangles, bounds, &BuildParams::default(), None).expect("builds");
+        let tree = build::build(&triangles, bounds, &BuildParams::default(), &Ledger::default(), None)
+            .expect("builds");
         for limit in [1, 16, 64, 1 << 30] {
             let pages = Pages::cut(&tree.nodes, &tree.references, limit);
             let mut sizes = Vec::new();

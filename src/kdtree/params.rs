@@ -1,5 +1,6 @@
 //! What the builder is free to choose.
 
+use super::preset::Preset;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,8 @@ pub const MAX_DEPTH: usize = 64;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BuildParams {
+    /// What the other values are by default: see [`Preset`].
+    pub preset: Preset,
     /// SAH cost of a step through an inner node. Only its ratio to `intersection_cost` counts.
     /// Raising the ratio gives larger leaves and a smaller tree: 3 suits packets, 5 beams and memory.
     pub traversal_cost: f32,
@@ -29,8 +32,9 @@ pub struct BuildParams {
     pub bins: usize,
     /// Nodes with fewer triangles than this are swept exactly, endpoint by endpoint.
     pub exact_below: usize,
-    /// Greatest number of references per triangle, on average: it bounds the tree's size on
-    /// meshes that the SAH would duplicate without end (long slivers in a bundle).
+    /// Greatest number of references and nodes per triangle, on average: it bounds the tree's size, and
+    /// with it the build's memory, on meshes that the SAH would duplicate without end (long slivers in a
+    /// bundle). Real models have some 5; with a `traversal_cost` near 1 they would have 10.
     pub max_duplication: f32,
     /// A subtree of at most this many triangles is a page, in which a tile of rays looks at all
     /// triangles at once. Raising it saves tiles steps and costs them tests; 64 is a good start.
@@ -40,6 +44,7 @@ pub struct BuildParams {
 impl Default for BuildParams {
     fn default() -> Self {
         Self {
+            preset: Preset::Standard,
             traversal_cost: 5.0,
             intersection_cost: 1.0,
             empty_bonus: 0.2,
@@ -48,7 +53,7 @@ impl Default for BuildParams {
             max_depth: 0,
             bins: 32,
             exact_below: 32,
-            max_duplication: 12.0,
+            max_duplication: 8.0,
             page: 64,
         }
     }

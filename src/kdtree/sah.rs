@@ -6,6 +6,7 @@
 use super::params::BuildParams;
 use crate::geometry::Aabb;
 use crate::simd::Lanes;
+use glam::Vec4;
 
 /// An axis-aligned plane that divides a cell, and the side on which triangles that lie in the
 /// plane go.
@@ -53,6 +54,20 @@ impl<'a> CellCost<'a> {
     #[inline(always)]
     pub fn range(&self, axis: usize) -> (f32, f32) {
         (self.cell.min[axis], self.cell.max[axis])
+    }
+
+    /// The planes across all axes at once.
+    #[inline]
+    pub fn axes(&self) -> AxesCost {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.axis(axis).lanes());
+        let of = |part: fn(&LaneCost) -> f32| Vec4::new(part(&x), part(&y), part(&z), 1.0);
+        AxesCost {
+            low: of(|axis| axis.low),
+            high: of(|axis| axis.high),
+            cap: of(|axis| axis.cap),
+            slope: of(|axis| axis.side) / of(|axis| axis.length),
+            traversal: Vec4::splat(x.traversal),
+        }
     }
 
     /// What a split costs by what its children are known to cost.
@@ -106,6 +121,7 @@ impl AxisCost {
     }
 
     /// The same model in single precision, for many planes at once.
+    #[inline]
     pub fn lanes(&self) -> LaneCost {
         let length = self.high - self.low;
         LaneCost {
@@ -171,6 +187,28 @@ impl LaneCost {
         let in_face = plane.le(low) | high.le(plane);
         let cost = L::select(none, cost * L::splat(self.kept), cost);
         L::select(none & in_face, L::splat(f32::INFINITY), cost)
+    }
+}
+
+/// [`AxisCost`] of three planes, one across each axis, both sides of which hold something. The last lane
+/// means nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct AxesCost {
+    low: Vec4,
+    high: Vec4,
+    cap: Vec4,
+    /// What the walls add to `cap` for each unit of length.
+    slope: Vec4,
+    traversal: Vec4,
+}
+
+impl AxesCost {
+    /// The costs; NaN or infinite across an axis along which the cell has no extent.
+    #[inline(always)]
+    pub fn of(&self, planes: Vec4, below: Vec4, above: Vec4) -> Vec4 {
+        let costs_below = (self.cap + self.slope * (planes - self.low)) * below;
+        let costs_above = (self.cap + self.slope * (self.high - planes)) * above;
+        self.traversal + (costs_below + costs_above)
     }
 }
 

@@ -26,8 +26,12 @@ pub struct TreeStats {
     pub largest_leaf: usize,
     /// `leaf_histogram[i]` leaves hold `i` triangles; the last entry counts all larger ones.
     pub leaf_histogram: Vec<usize>,
+    /// `depth_histogram[i]` leaves lie below `i` inner nodes.
+    pub depth_histogram: Vec<usize>,
     /// Inner nodes on the longest way from the root to a leaf.
     pub depth: usize,
+    /// `duplication_histogram[i]` triangles are in `i + 1` leaves; the last entry counts those in more.
+    pub duplication_histogram: Vec<usize>,
     /// Expected cost of a ray by the SAH, in the units of the build parameters.
     pub sah_cost: f64,
     /// Expected inner nodes for a ray that meets the bounds, early termination not counted.
@@ -70,6 +74,7 @@ impl KdTree {
         let mut stats = TreeStats {
             triangles: self.triangles.len(),
             leaf_histogram: vec![0; HISTOGRAM + 1],
+            duplication_histogram: vec![0; HISTOGRAM],
             node_bytes: self.nodes.len() * size_of::<Node>(),
             reference_bytes: self.references.len() * size_of::<u32>(),
             triangle_bytes: self.triangles.len() * size_of::<Triangle>(),
@@ -81,12 +86,20 @@ impl KdTree {
         let root_area = self.bounds.area();
         let probability = |cell: &Aabb| if root_area > 0.0 { cell.area() / root_area } else { 1.0 };
 
+        let mut leaves_of = vec![0u32; self.triangles.len()];
         let mut stack = vec![(self.root(), self.bounds, 0)];
         while let Some((node, cell, depth)) = stack.pop() {
             stats.nodes += 1;
             stats.depth = stats.depth.max(depth);
             if node.is_leaf() {
                 let count = self.primitives(node).len();
+                for &primitive in self.primitives(node) {
+                    leaves_of[primitive as usize] += 1;
+                }
+                if stats.depth_histogram.len() <= depth {
+                    stats.depth_histogram.resize(depth + 1, 0);
+                }
+                stats.depth_histogram[depth] += 1;
                 stats.leaves += 1;
                 stats.empty_leaves += usize::from(count == 0);
                 stats.references += count;
@@ -101,6 +114,11 @@ impl KdTree {
                 stack.push((above, high, depth + 1));
                 stack.push((below, low, depth + 1));
             }
+        }
+
+        // Triangles without area may be in no leaf.
+        for count in leaves_of.into_iter().filter(|&count| count > 0) {
+            stats.duplication_histogram[(count as usize).min(HISTOGRAM) - 1] += 1;
         }
 
         let triangles = stats.triangles.max(1) as f64;

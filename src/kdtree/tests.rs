@@ -167,3 +167,56 @@ fn validate_sees_what_is_broken() {
     assert!(fault(circle).contains("two parents"));
     assert!(fault(|t| t.references.push(0)).contains("belongs to no leaf"));
 }
+
+/// Meshes that strain a builder: coincident triangles, one under everything, slivers, far outliers.
+fn strained() -> Vec<Mesh> {
+    let mut numbers = Numbers(5);
+    let one = soup(1, 1.0, 7).positions;
+    let coincident = mesh_of(std::iter::repeat_n([one[0], one[1], one[2]], 20_000));
+    let mut carpet = soup(20_000, 0.1, 3);
+    let first = carpet.positions.len() as u32;
+    carpet.positions.extend([
+        Vec3::new(-9.0, 0.0, -9.0),
+        Vec3::new(40.0, 0.1, -9.0),
+        Vec3::new(-9.0, 0.0, 40.0),
+    ]);
+    carpet.triangles.push([first, first + 1, first + 2]);
+    let slivers = mesh_of((0..20_000).map(|_| {
+        let from = numbers.point() * 10.0;
+        let to = numbers.point() * 10.0;
+        [from, to, to + Vec3::X * 1e-4]
+    }));
+    let mut outlier = soup(20_000, 0.1, 4);
+    outlier.positions[0] *= 1e6;
+    vec![coincident, carpet, slivers, outlier, lattice(20_000, 2)]
+}
+
+#[test]
+fn the_tree_does_not_depend_on_threads_however_the_mesh_strains() {
+    for (number, mesh) in strained().iter().enumerate() {
+        for preset in Preset::ALL {
+            let build = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+                pool.install(|| KdTree::build(mesh, &BuildParams::preset(preset), None).expect("builds"))
+            };
+            let (one, three) = (build(1), build(3));
+            assert!(one.nodes == three.nodes && one.references == three.references, "{number}, {preset}");
+        }
+    }
+}
+
+#[test]
+fn memory_and_depth_are_bounded_as_announced() {
+    for (number, mesh) in strained().iter().enumerate() {
+        for traversal_cost in [3.0, 0.01] {
+            let params = BuildParams { traversal_cost, max_duplication: 4.0, ..Default::default() };
+            let announced = params.peak_bytes(mesh.triangles.len());
+            let tree = KdTree::build(mesh, &params, None).expect("builds");
+            assert!(tree.build_peak() <= announced, "{number}: {} of {announced}", tree.build_peak());
+            let stats = tree.stats();
+            assert!(tree.build_peak() >= stats.bytes(), "{number}: {} bytes", stats.bytes());
+            assert!(stats.references + stats.nodes <= 4 * mesh.triangles.len() + 1024, "{number}: {stats:?}");
+            assert!(stats.depth <= MAX_DEPTH);
+        }
+    }
+}

@@ -9,10 +9,12 @@ pub mod generate;
 pub mod obj;
 pub mod ply;
 mod read;
+mod shape;
 
 pub use check::MAX_TRIANGLES;
 pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
+pub use shape::{DECADES, Shapes};
 
 use crate::geometry::Aabb;
 use glam::Vec3;

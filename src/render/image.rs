@@ -95,6 +95,19 @@ pub fn write_depth(path: &Path, size: Size, depths: &[f32]) -> Result<()> {
     })
 }
 
+/// Writes what pixels cost: as they are into EXR and PFM, as distances are, and in `color`'s colours into PNG.
+///
+/// # Errors
+/// As [`write_color`].
+pub fn write_heat(path: &Path, size: Size, costs: &[f32], color: impl Fn(f32) -> [u8; 3]) -> Result<()> {
+    assert_eq!(costs.len() as u64, size.pixels());
+    if Format::of(path)? != Format::Png {
+        return write_depth(path, size, costs);
+    }
+    let bytes: Vec<u8> = costs.iter().flat_map(|&cost| color(cost)).collect();
+    write_whole(path, |out| encode_png(out, size, &bytes, ExtendedColorType::Rgb8))
+}
+
 fn write_rgb(
     path: &Path,
     size: Size,

@@ -117,13 +117,15 @@ pub(super) struct Scratch<const W: usize> {
     lit: Vec<u32>,
     shadows: Vec<RayPacket<W>>,
     occluded: Vec<u32>,
-    dispatch: Dispatch,
+    /// What has been learnt about kernels.
+    pub dispatch: Dispatch,
     pub camera: Tally,
     pub shadow: Tally,
 }
 
 impl<const W: usize> Scratch<W> {
-    pub fn new() -> Self {
+    /// Empty, with what has been learnt before about kernels.
+    pub fn new(dispatch: Dispatch) -> Self {
         let count = BATCH / W;
         let block = Block { x: 0, y: 0, key: [Vec3::ZERO; W], sum: [Vec3::ZERO; W] };
         Self {
@@ -134,7 +136,7 @@ impl<const W: usize> Scratch<W> {
             lit: vec![0; count],
             shadows: vec![RayPacket::empty(); count],
             occluded: vec![0; count],
-            dispatch: Dispatch::default(),
+            dispatch,
             camera: Tally::default(),
             shadow: Tally::default(),
         }
@@ -304,7 +306,7 @@ mod tests {
         let mut seen = vec![0; tile.pixels()];
         let (width, height) = block_size(W);
         assert_eq!((width * height) as usize, W);
-        let mut scratch = Scratch::<W>::new();
+        let mut scratch = Scratch::<W>::new(Dispatch::default());
         for y in (0..tile.height).step_by(SQUARE as usize) {
             for x in (0..tile.width).step_by(SQUARE as usize) {
                 let used = scratch.cover(&tile, x, y);

@@ -1,13 +1,16 @@
 //! Experiments and their reports: how fast and how right engines are.
 //!
-//! [`mod@bench`] measures speed, [`accuracy`] errors; both on the same kinds of [`rays`], from the standard
+//! [`mod@bench`] measures speed, [`accuracy`] errors, and [`tune`] looks for settings; all on the same kinds of [`rays`], from the standard
 //! [`views`], and beside the same rivals. What is right, the [`mod@reference`] says.
 
 pub mod accuracy;
 pub mod bench;
+pub mod heat;
 #[cfg(feature = "peers")]
 pub mod peers;
 pub mod rays;
 pub mod reference;
+pub mod resident;
 pub(crate) mod text;
+pub mod tune;
 pub mod views;

@@ -119,6 +119,11 @@ impl RaySets {
         Self { setup, camera, surfaces }
     }
 
+    /// Where they come from.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
     /// The rays of a kind. Empty when the camera sees nothing to start them from.
     pub fn rays(&self, kind: RayKind) -> Vec<Ray> {
         match kind {

@@ -42,10 +42,15 @@ pub struct Frame {
     low: Vec4,
     /// Bins per unit of length; 0 along an axis without extent.
     scale: Vec4,
+    /// A bin's length.
+    width: Vec4,
     last: f32,
     bins: usize,
     extent: Aabb,
 }
+
+/// The most bins of an axis.
+pub const MOST_BINS: usize = 1024;
 
 /// Adding it to a small number leaves that number, rounded, in the lowest bits.
 const ROUND: f32 = 8_388_608.0;
@@ -56,7 +61,14 @@ impl Frame {
         let scale = bins as f32 / extent.extent();
         // No length, or one that overflows: then one bin has it all, and the ends are tried all the same.
         let scale = Vec3::select(scale.is_finite_mask(), scale, Vec3::ZERO);
-        Self { low: extent.min.extend(0.0), scale: scale.extend(0.0), last: bins as f32 - 1.0, bins, extent }
+        Self {
+            low: extent.min.extend(0.0),
+            scale: scale.extend(0.0),
+            width: (extent.extent() / bins as f32).extend(0.0),
+            last: bins as f32 - 1.0,
+            bins,
+            extent,
+        }
     }
 
     /// The bins of four coordinates. They grow with the coordinate; which side a boundary's own
@@ -65,79 +77,102 @@ impl Frame {
     fn of(&self, at: Vec4) -> [u32; 4] {
         let bin = (at - self.low) * self.scale - Vec4::splat(0.5);
         let bin = bin.max(Vec4::ZERO).min(Vec4::splat(self.last)) + Vec4::splat(ROUND);
-        bin.to_array().map(|bin| bin.to_bits() & 0x3ff)
+        bin.to_array().map(|bin| bin.to_bits() % MOST_BINS as u32)
     }
 
-    /// Where a bin begins, but for rounding.
-    fn boundary(&self, axis: usize, bin: usize) -> f32 {
-        let (low, high) = (f64::from(self.extent.min[axis]), f64::from(self.extent.max[axis]));
-        (low + (high - low) * (bin as f64 / self.bins as f64)) as f32
+    /// Where a bin begins along each axis, but for rounding.
+    #[inline(always)]
+    fn boundaries(&self, bin: usize) -> Vec4 {
+        self.low + self.width * bin as f32
     }
 }
 
 /// Begins and ends per bin: of x, y and z, and four lanes on of their ends.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Table {
-    counts: Vec<[u32; 8]>,
+    counts: Box<[[u32; 8]; MOST_BINS]>,
+}
+
+impl Default for Table {
+    fn default() -> Self {
+        Self { counts: Box::new([[0; 8]; MOST_BINS]) }
+    }
 }
 
 impl Table {
     /// Empties it.
     pub fn reset(&mut self, bins: usize) {
-        self.counts.clear();
-        self.counts.resize(bins, [0; 8]);
+        self.counts[..bins].fill([0; 8]);
     }
 
     pub fn count(&mut self, references: &[Reference], frame: &Frame) {
+        let counts = &mut *self.counts;
         for reference in references {
             let (starts, ends) = (frame.of(reference.low()), frame.of(reference.high()));
             for axis in 0..3 {
-                self.counts[starts[axis] as usize][axis] += 1;
-                self.counts[ends[axis] as usize][4 + axis] += 1;
+                counts[starts[axis] as usize % MOST_BINS][axis] += 1;
+                counts[ends[axis] as usize % MOST_BINS][4 + axis] += 1;
             }
         }
     }
 
     pub fn add(&mut self, other: &Self) {
-        for (bin, others) in self.counts.iter_mut().zip(&other.counts) {
+        for (bin, others) in self.counts.iter_mut().zip(&*other.counts) {
             for lane in 0..8 {
                 bin[lane] += others[lane];
             }
         }
     }
 
-    /// The cheapest boundary of all; `None` if none divides.
+    /// The cheapest boundary of all; `None` if none divides. All axes are priced at once, in single
+    /// precision: what is chosen is looked at more closely.
     pub fn best_boundary(&self, frame: &Frame, costs: &CellCost, count: usize) -> Option<Boundary> {
-        let mut best: Option<Boundary> = None;
-        for axis in 0..3 {
-            if frame.scale[axis] == 0.0 {
-                continue;
+        let cost = costs.axes();
+        let divides = frame.scale.cmpgt(Vec4::ZERO);
+        let (mut below, mut above) = ([0; 4], [count as i32; 4]);
+        let mut best = Vec4::INFINITY;
+        let mut best_bin = Vec4::ZERO;
+        for bin in 1..frame.bins {
+            let before = &self.counts[bin - 1];
+            for axis in 0..4 {
+                below[axis] += before[axis] as i32;
+                above[axis] -= before[4 + axis] as i32;
             }
-            let cost = costs.axis(axis);
-            let (mut below, mut above) = (0, count);
-            for bin in 1..frame.bins {
-                let (starts, ends) = (self.counts[bin - 1][axis], self.counts[bin - 1][4 + axis]);
-                below += starts as usize;
-                above -= ends as usize;
-                if starts + ends + self.counts[bin][axis] + self.counts[bin][4 + axis] == 0 {
-                    continue; // Nothing begins or ends nearby: its neighbours do as well.
-                }
-                let split = cost.split(frame.boundary(axis, bin), below, 0, above);
-                if split.cost.is_finite() && best.is_none_or(|best| split.cost < best.split.cost) {
-                    let below = below - starts as usize;
-                    let above = above + ends as usize;
-                    best = Some(Boundary { split, bin, below, above });
-                }
-            }
+            // Something begins in the first bin and ends in the last one: no side is empty.
+            let [below, above] = [below, above].map(|counts| Vec4::from_array(counts.map(|n| n as f32)));
+            let cost = cost.of(frame.boundaries(bin), below, above);
+            let better = cost.cmplt(best) & divides;
+            best = Vec4::select(better, cost, best);
+            best_bin = Vec4::select(better, Vec4::splat(bin as f32), best_bin);
         }
-        best
+
+        let best = best.xyz();
+        let axis = best.min_position();
+        if best[axis] == f32::INFINITY {
+            return None;
+        }
+        let bin = best_bin[axis] as usize;
+        let mut boundary = Boundary { axis, bin, below: 0, above: count };
+        for counts in &self.counts[..bin - 1] {
+            boundary.below += counts[axis] as usize;
+            boundary.above -= counts[4 + axis] as usize;
+        }
+        Some(boundary)
+    }
+
+    /// The split at a boundary.
+    fn split(&self, boundary: &Boundary, frame: &Frame, costs: &CellCost) -> Split {
+        let Boundary { axis, bin, below, above } = *boundary;
+        let between = &self.counts[bin - 1];
+        let (below, above) = (below + between[axis] as usize, above - between[4 + axis] as usize);
+        costs.axis(axis).split(frame.boundaries(bin)[axis], below, 0, above)
     }
 }
 
 /// A boundary between two bins, and what lies around these.
 #[derive(Clone, Copy)]
 pub struct Boundary {
-    split: Split,
+    axis: usize,
     /// The bin above it.
     bin: usize,
     /// References that begin below both bins.
@@ -149,28 +184,32 @@ pub struct Boundary {
 impl Boundary {
     /// Collects what begins or ends in its two bins.
     pub fn gather(&self, references: &[Reference], frame: &Frame, events: &mut Vec<Event>) {
-        let axis = self.split.axis;
-        let (low, scale, bin) = (frame.low[axis], frame.scale[axis], self.bin as u32);
-        let inside = |x: f32| {
-            let [of_x, ..] =
-                Frame { low: Vec4::splat(low), scale: Vec4::splat(scale), ..*frame }.of(Vec4::splat(x));
-            of_x == bin || of_x + 1 == bin
-        };
+        let (axis, bin) = (self.axis, self.bin as u32);
+        let along =
+            Frame { low: Vec4::splat(frame.low[axis]), scale: Vec4::splat(frame.scale[axis]), ..*frame };
         for reference in references {
             let (low, high) = (reference.min(axis), reference.max(axis));
-            Event::push(low, high, inside(low), inside(high), events);
+            let [of_low, of_high, ..] = along.of(Vec4::new(low, high, low, high));
+            let [with_low, with_high] = [of_low, of_high].map(|of| of == bin || of + 1 == bin);
+            if with_low | with_high {
+                Event::push(low, high, with_low, with_high, events);
+            }
         }
     }
 
     /// The cheapest of the planes at `events`, which are sorted, at this boundary, and at the ends of the
     /// references' extent, where empty space may be cut off.
-    pub fn refine(self, events: &[Event], frame: &Frame, costs: &CellCost, count: usize) -> Option<Split> {
-        let axis: AxisCost = costs.axis(self.split.axis);
+    pub fn refine(
+        &self,
+        events: &[Event],
+        table: &Table,
+        frame: &Frame,
+        costs: &CellCost,
+        count: usize,
+    ) -> Option<Split> {
+        let axis: AxisCost = costs.axis(self.axis);
         let fine = price(events, &axis, self.below, self.above, ends_of_extent(frame, costs, count));
-        match fine {
-            Some(fine) => cheaper(Some(fine), self.split),
-            None => Some(self.split),
-        }
+        cheaper(fine, table.split(self, frame, costs))
     }
 }
 

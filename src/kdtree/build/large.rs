@@ -4,7 +4,7 @@
 //! parallel; dividing makes two lists of chunks out of one and frees what it has read, so that hardly
 //! more memory is in use than the references need.
 
-use super::binned::{self, Extent, Frame, Table};
+use super::binned::{self, Extent, Frame, MOST_BINS, Table};
 use super::exact::Event;
 use super::partition::Divider;
 use super::reference::Reference;
@@ -12,6 +12,7 @@ use super::subtree::{self, Subtree};
 use super::{Built, Context, Place, Verdict};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
+use crate::kdtree::memory::{Ledger, bytes_of};
 use crate::kdtree::node::Node;
 use crate::kdtree::sah::{CellCost, Split};
 use rayon::prelude::*;
@@ -52,18 +53,21 @@ pub enum Part {
 /// Builds a subtree, its children side by side while they are large.
 pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
     let count = chunks.iter().map(Vec::len).sum();
-    if count < SMALL {
-        return Part::Whole(subtree::build(context, chunks.concat(), place));
+    if count < SMALL || count > place.in_flight {
+        let references = chunks.concat();
+        context.ledger.add(bytes_of(&references));
+        free(context, chunks);
+        return Part::Whole(subtree::build(context, references, place));
     }
     let split = context.may_split(count, &place).and_then(|costs| {
         let split = best_split(context, &chunks, count, &costs)?;
         (split.cost < costs.leaf(count)).then_some(split)
     });
-    let Some(split) = split else { return leaf(context, &chunks, &place) };
+    let Some(split) = split else { return leaf(context, chunks, &place) };
     let parts = divide(context, chunks, &split);
     let counts = [0, 1].map(|side: usize| parts[side].iter().map(Vec::len).sum::<usize>());
     let Some([place_below, place_above]) = place.children(&split, &Verdict::Good, counts, count) else {
-        return leaf(context, &parts.concat(), &place);
+        return leaf(context, parts.into_iter().flatten().collect(), &place);
     };
     let [below, above] = parts;
     let (below, above) =
@@ -71,10 +75,17 @@ pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
     Part::Inner(split, Box::new([below, above]))
 }
 
+/// Drops chunks.
+fn free(context: &Context, chunks: Chunks) {
+    context.ledger.sub(chunks.iter().map(bytes_of).sum());
+}
+
 /// All in one leaf, each triangle once.
-fn leaf(context: &Context, chunks: &[Vec<Reference>], place: &Place) -> Part {
+fn leaf(context: &Context, chunks: Chunks, place: &Place) -> Part {
     context.finished(place.share);
     let mut ids: Vec<u32> = chunks.iter().flatten().map(Reference::primitive).collect();
+    context.ledger.add(bytes_of(&ids));
+    free(context, chunks);
     ids.par_sort_unstable();
     ids.dedup();
     Part::Whole(Subtree::leaf(ids))
@@ -83,7 +94,7 @@ fn leaf(context: &Context, chunks: &[Vec<Reference>], place: &Place) -> Part {
 /// The cheapest plane found; `None` if none divides.
 fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost) -> Option<Split> {
     let bins = context.params.bins;
-    let bins = if count > MANY { (bins * FINER).min(1024) } else { bins };
+    let bins = if count > MANY { (bins * FINER).min(MOST_BINS) } else { bins };
     let extent_of = |chunk: &Vec<Reference>| {
         let mut extent = Extent::NONE;
         extent.grow(chunk);
@@ -116,14 +127,17 @@ fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost
         a
     });
     events.par_sort_unstable();
-    boundary.refine(&events, &frame, costs, count)
+    boundary.refine(&events, &table, &frame, costs, count)
 }
 
 /// The references below a plane and above.
 fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
     let divided = |divider: &mut Divider, mut chunk: Vec<Reference>| {
+        let before = bytes_of(&chunk);
         let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split).to_vec();
+        context.ledger.add(bytes_of(&below));
         chunk.shrink_to_fit();
+        context.ledger.sub(before - bytes_of(&chunk));
         [below, chunk]
     };
     let parts: Vec<[Vec<Reference>; 2]> =
@@ -133,7 +147,12 @@ fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
         for (side, part) in sides.iter_mut().zip(pair) {
             match side.last_mut() {
                 _ if part.is_empty() => {}
-                Some(last) if last.len() + part.len() <= CHUNK => last.extend_from_slice(&part),
+                Some(last) if last.len() + part.len() <= CHUNK => {
+                    let before = bytes_of(last) + bytes_of(&part);
+                    last.reserve_exact(part.len());
+                    last.extend_from_slice(&part);
+                    context.ledger.sub(before - bytes_of(last));
+                }
                 _ => side.push(part),
             }
         }
@@ -158,13 +177,24 @@ impl Part {
         }
     }
 
+    /// What it is on the ledger with.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Inner(_, children) => children.iter().map(Self::bytes).sum(),
+            Self::Whole(subtree) => bytes_of(&subtree.nodes) + bytes_of(&subtree.references),
+        }
+    }
+
     /// The whole tree in two arrays: the root, an unused place, so that pairs of siblings are aligned,
     /// and then the pairs.
-    pub fn gathered(self) -> Built {
+    pub fn gathered(self, ledger: &Ledger) -> Built {
         let mut nodes = vec![Node::leaf(0, 0); 2 + self.nodes()];
         let mut references = vec![0; self.references()];
+        ledger.add(bytes_of(&nodes) + bytes_of(&references));
+        let bytes = self.bytes();
         let (root, rest) = nodes.split_at_mut(2);
         root[0] = self.place(rest, 2, &mut references, 0);
+        ledger.sub(bytes);
         Built { nodes, references }
     }
 

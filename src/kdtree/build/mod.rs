@@ -17,6 +17,7 @@ mod partition;
 mod reference;
 mod subtree;
 
+use super::memory::{IN_FLIGHT, Ledger, bytes_of};
 use super::node::{MAX_INDEX, Node};
 use super::params::BuildParams;
 use super::sah::{CellCost, Split};
@@ -24,7 +25,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::simd::Chosen;
-use reference::Reference;
+pub(super) use reference::Reference;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How far a build has come: triangles that have reached a leaf, out of all. For progress bars;
@@ -47,6 +48,9 @@ pub(super) struct Built {
     pub references: Vec<u32>,
 }
 
+/// Nodes and references that even the smallest model may have.
+pub(super) const SPARE: usize = 1024;
+
 /// Builds the tree of all triangles, whose corners must be finite.
 ///
 /// # Errors
@@ -55,9 +59,10 @@ pub(super) fn build(
     triangles: &[Triangle],
     bounds: Aabb,
     params: &BuildParams,
+    ledger: &Ledger,
     progress: Option<&BuildProgress>,
 ) -> Result<Built> {
-    let budget = (triangles.len() as f64 * f64::from(params.max_duplication)) as usize + 1024;
+    let budget = (triangles.len() as f64 * f64::from(params.max_duplication)) as usize + SPARE;
     if budget > MAX_INDEX / 4 && triangles.len() > MAX_INDEX / 16 {
         return Err(Error::Mesh(format!(
             "{} triangles are more than one tree can hold; split the model",
@@ -69,15 +74,24 @@ pub(super) fn build(
         triangles,
         depth_limit: params.depth_limit(triangles.len()),
         isa: Chosen::best(),
+        ledger,
         progress,
     };
-    let place =
-        Place { cell: bounds, depth: 0, bad_splits: 0, budget: budget.min(MAX_INDEX / 4), share: 1.0 };
-    let part = large::build(&context, large::chunks_of(triangles), place);
+    let place = Place {
+        cell: bounds,
+        depth: 0,
+        bad_splits: 0,
+        budget: budget.min(MAX_INDEX / 4),
+        in_flight: (triangles.len() as f64 * IN_FLIGHT) as usize,
+        share: 1.0,
+    };
+    let chunks = large::chunks_of(triangles);
+    ledger.add(chunks.iter().map(bytes_of).sum());
+    let part = large::build(&context, chunks, place);
     if part.nodes() + 2 > MAX_INDEX || part.references() > MAX_INDEX {
         return Err(Error::Mesh("its tree is too large to address; raise build.min_leaf".into()));
     }
-    Ok(part.gathered())
+    Ok(part.gathered(ledger))
 }
 
 /// What every node of a build needs to know.
@@ -86,6 +100,7 @@ struct Context<'a> {
     triangles: &'a [Triangle],
     depth_limit: usize,
     isa: Chosen,
+    ledger: &'a Ledger,
     progress: Option<&'a BuildProgress>,
 }
 
@@ -96,11 +111,16 @@ struct Place {
     depth: usize,
     /// Splits in a row that cost more than a leaf.
     bad_splits: u32,
-    /// How many references its leaves may hold together.
+    /// How many references and nodes it may have together.
     budget: usize,
+    /// How many references its descendants may hold at a time.
+    in_flight: usize,
     /// Its share of the whole work, for the progress bar.
     share: f64,
 }
+
+/// A tree of two children each has nearly two nodes for each leaf.
+const NODES_PER_LEAF: usize = 2;
 
 /// What to do about a split.
 enum Verdict {
@@ -174,7 +194,7 @@ impl Place {
         let (axis, total) = (split.axis, parts[0] + parts[1]);
         // A plane that divides nothing would be tried for ever.
         let in_face = split.position <= self.cell.min[axis] || split.position >= self.cell.max[axis];
-        if total > self.budget || parts == [count; 2] && in_face {
+        if total + 2 * NODES_PER_LEAF > self.budget || parts == [count; 2] && in_face {
             return None;
         }
         let bad_splits = match *verdict {
@@ -184,8 +204,16 @@ impl Place {
         let [below, above] = self.cell.halves(axis, split.position);
         let child = |references: usize, cell: Aabb| {
             let part = references as f64 / total.max(1) as f64;
-            let budget = (self.budget as f64 * part) as usize;
-            Self { cell, depth: self.depth + 1, bad_splits, budget, share: self.share * part }
+            // What is left over when each has what a leaf needs.
+            let spare = (self.budget - total - 2 * NODES_PER_LEAF) as f64;
+            Self {
+                cell,
+                depth: self.depth + 1,
+                bad_splits,
+                budget: references + NODES_PER_LEAF + (spare * part) as usize,
+                in_flight: (self.in_flight as f64 * part) as usize,
+                share: self.share * part,
+            }
         };
         Some([child(parts[0], below), child(parts[1], above)])
     }

@@ -10,6 +10,7 @@ use super::few::{self, Few};
 use super::partition::Divider;
 use super::reference::Reference;
 use super::{Context, Place, Verdict};
+use crate::kdtree::memory::bytes_of;
 use crate::kdtree::node::Node;
 use crate::kdtree::pages::sort_and_dedup;
 use crate::kdtree::sah::{CellCost, Split};
@@ -30,6 +31,7 @@ impl Subtree {
 
 /// Builds the subtree of some references on this thread.
 pub fn build(context: &Context, references: Vec<Reference>, place: Place) -> Subtree {
+    let given = bytes_of(&references);
     let mut builder = Builder {
         context,
         stack: references,
@@ -40,7 +42,13 @@ pub fn build(context: &Context, references: Vec<Reference>, place: Place) -> Sub
     };
     let (root, _) = builder.node(0, place);
     context.finished(place.share);
-    Subtree { root, nodes: builder.nodes, references: builder.references }
+    let Builder { stack, mut nodes, mut references, .. } = builder;
+    nodes.shrink_to_fit();
+    references.shrink_to_fit();
+    // How far the stack has grown is known only now.
+    context.ledger.add(bytes_of(&stack) - given + bytes_of(&nodes) + bytes_of(&references));
+    context.ledger.sub(bytes_of(&stack));
+    Subtree { root, nodes, references }
 }
 
 /// Memory that the search for splits reuses.
@@ -66,7 +74,7 @@ impl Scratch {
                     self.events.clear();
                     boundary.gather(references, &frame, &mut self.events);
                     self.events.sort_unstable();
-                    boundary.refine(&self.events, &frame, costs, count)
+                    boundary.refine(&self.events, &self.table, &frame, costs, count)
                 }
                 None => binned::ends_of_extent(&frame, costs, count),
             }

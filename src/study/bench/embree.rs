@@ -24,6 +24,11 @@ pub struct Embree {
 }
 
 impl Embree {
+    /// A device with one scene, already built.
+    pub fn of_scene(device: Arc<Device>, scene: Scene) -> Self {
+        Self { device, scenes: vec![scene] }
+    }
+
     /// Loads the library and builds with all threads, a scene for each of `builds`. `isa` holds it to an
     /// instruction set.
     ///

@@ -17,6 +17,7 @@
 //! slower than its best in a qualifying run are dropped unless [`Pace::all_modes`] is set.
 
 pub mod agreement;
+pub mod build;
 #[cfg(feature = "peers")]
 pub(super) mod embree;
 pub(super) mod engine;
@@ -91,6 +92,8 @@ pub struct Options {
     pub kinds: Vec<RayKind>,
     /// Engines, in the order of the report.
     pub engines: Vec<EngineName>,
+    /// raypack's modes, by name: its kernels, and `auto`. None named are all. Rivals always race in every mode.
+    pub modes: Vec<String>,
     /// The camera; `None` frames the model.
     pub camera: Option<Camera>,
     /// Width and height of the camera's image.
@@ -191,6 +194,10 @@ fn check(options: &Options) -> Result<()> {
     if options.engines.is_empty() {
         return Err(Error::option("--engines", "no engine is named; known are raypack, embree, obvhs"));
     }
+    let known: Vec<&str> = Kernel::ALL.iter().map(|kernel| kernel.name()).chain([ours::AUTO]).collect();
+    if let Some(mode) = options.modes.iter().find(|mode| !known.contains(&mode.as_str())) {
+        return Err(Error::option("--modes", format!("\"{mode}\" is not one of {}", known.join(", "))));
+    }
     if options.kinds.is_empty() {
         return Err(Error::option("--rays", "no kind of ray is named"));
     }
@@ -230,7 +237,12 @@ fn race_kind(
 ) {
     let (mut contenders, mut entries) = (Vec::new(), Vec::new());
     for (number, engine) in engines.iter().enumerate() {
+        let named = |mode: &String| options.modes.is_empty() || options.modes.contains(mode);
         for contender in engine.contenders(rays, kind.any_hit()) {
+            // Only raypack's modes never have to qualify.
+            if !engine.qualifies() && !named(&contender.mode()) {
+                continue;
+            }
             contenders.push(contender);
             entries.push(Entry { engine: number, qualifies: engine.qualifies() });
         }

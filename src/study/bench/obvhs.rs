@@ -12,6 +12,11 @@ pub struct Obvhs {
 }
 
 impl Obvhs {
+    /// One tree, already built.
+    pub fn of_scene(layout: Layout, preset: Preset, scene: Scene) -> Self {
+        Self { scenes: vec![(layout, preset, scene)] }
+    }
+
     /// Builds every tree.
     pub fn new(mesh: &Mesh) -> Self {
         let build = |(layout, preset)| (layout, preset, Scene::new(mesh, layout, preset));

@@ -41,6 +41,11 @@ impl Ours {
         Self { accel, build_seconds, bytes }
     }
 
+    /// Seconds that the build took.
+    pub fn build_seconds(&self) -> f64 {
+        self.build_seconds
+    }
+
     /// The built tree.
     pub fn accel(&self) -> &Accel {
         &self.accel
@@ -122,7 +127,7 @@ impl Ours {
             put(&learnt, dispatch);
         };
         let lots = Packets::lots(rays, any_hit);
-        Box::new(PacketRun { engine: self, mode: "auto", lots, closest, any })
+        Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any })
     }
 }
 
@@ -195,6 +200,9 @@ impl Contender for SliceRun<'_> {
         collect(&self.lots, |hits, _, all| all.extend(hits), |flags, _, all| all.extend(flags))
     }
 }
+
+/// The mode that finds out which kernel is quickest.
+pub const AUTO: &str = "auto";
 
 /// Packets in a tile.
 const TILE: usize = 16;

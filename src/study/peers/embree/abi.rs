@@ -21,6 +21,8 @@ pub const BUFFER_VERTEX: u32 = 1;
 pub const FORMAT_UINT3: u32 = 0x5003;
 /// `RTC_FORMAT_FLOAT3`.
 pub const FORMAT_FLOAT3: u32 = 0x9003;
+/// `RTC_BUILD_QUALITY_LOW`: Morton codes.
+pub const QUALITY_LOW: u32 = 0;
 /// `RTC_BUILD_QUALITY_MEDIUM`, the default.
 pub const QUALITY_MEDIUM: u32 = 1;
 /// `RTC_BUILD_QUALITY_HIGH`: spatial splits.

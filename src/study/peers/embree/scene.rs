@@ -2,7 +2,7 @@
 
 use super::abi::{
     Arguments, BUFFER_INDEX, BUFFER_VERTEX, FORMAT_FLOAT3, FORMAT_UINT3, GEOMETRY_TRIANGLE, Handle,
-    QUALITY_HIGH, QUALITY_MEDIUM, RayHits, Rays, SCENE_ROBUST, Valid,
+    QUALITY_HIGH, QUALITY_LOW, QUALITY_MEDIUM, RayHits, Rays, SCENE_ROBUST, Valid,
 };
 use super::device::Device;
 use crate::error::{Error, Result};
@@ -14,6 +14,8 @@ use std::time::Instant;
 /// How a scene is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Build {
+    /// For scenes that change: Morton codes in place of the SAH.
+    Low,
     /// Embree's default quality.
     Medium,
     /// Spatial splits.
@@ -24,12 +26,15 @@ pub enum Build {
 }
 
 impl Build {
-    /// All of them.
+    /// The qualities, quickest first.
+    pub const QUALITIES: [Self; 3] = [Self::Low, Self::Medium, Self::High];
+    /// Those that rays are raced on.
     pub const ALL: [Self; 3] = [Self::Medium, Self::High, Self::RobustHigh];
 
-    /// `medium`, `high` or `robust`.
+    /// `low`, `medium`, `high` or `robust`.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Low => "low",
             Self::Medium => "medium",
             Self::High => "high",
             Self::RobustHigh => "robust",
@@ -72,6 +77,7 @@ impl Scene {
         let mut scene = Self { device: Arc::clone(device), handle, build, build_seconds: 0.0, bytes: 0 };
         let geometry = Geometry::new(device, mesh)?;
         let (quality, flags) = match build {
+            Build::Low => (QUALITY_LOW, 0),
             Build::Medium => (QUALITY_MEDIUM, 0),
             Build::High => (QUALITY_HIGH, 0),
             Build::RobustHigh => (QUALITY_HIGH, SCENE_ROBUST),
