@@ -16,25 +16,30 @@ pub struct BuildParams {
     /// SAH cost of a step through an inner node. Only its ratio to `intersection_cost` counts.
     /// Raising the ratio gives larger leaves and a smaller tree: 3 suits packets, 5 beams and memory.
     pub traversal_cost: f32,
-    /// SAH cost of testing one triangle.
+    /// SAH cost of testing one triangle: 1, which makes `traversal_cost` the ratio.
     pub intersection_cost: f32,
     /// The part of a split's cost that is forgiven when it cuts off empty space, 0 to 1. Raising
     /// it skips more air and costs nodes; 0.2 is a good start.
     pub empty_bonus: f32,
     /// A leaf of at most this many triangles is never split. Raising it makes the build quicker
-    /// and rays slower; 1 leaves it all to the SAH.
+    /// and rays slower; 1 leaves it all to the SAH. Start from 2, and from 8 for a quick build.
     pub min_leaf: usize,
-    /// How many splits in a row may cost more than a leaf would, in the hope of a good one below.
+    /// How many splits in a row may cost more than a leaf would, in the hope of a good one below. Splits
+    /// made in vain are taken back, so that raising it costs time to build and may help rays; start from 1.
     pub bad_splits: u32,
-    /// Depth limit, at most 64; 0 derives it from the number of triangles.
+    /// Depth limit, at most 64; 0 derives it from the number of triangles, which is where to start. Lowering it
+    /// cuts subtrees off, which then are large leaves.
     pub max_depth: usize,
-    /// Bins per axis for nodes above `exact_below`, 8 to 1024.
+    /// Bins per axis for nodes above `exact_below`, 8 to 1024. Raising it finds better planes in large nodes and
+    /// makes the build slower; start from 32.
     pub bins: usize,
-    /// Nodes with fewer triangles than this are swept exactly, endpoint by endpoint.
+    /// Nodes with fewer triangles than this are swept exactly, endpoint by endpoint. Raising it makes the build
+    /// slower and the tree's lower levels a little better; start from 32.
     pub exact_below: usize,
     /// Greatest number of references and nodes per triangle, on average: it bounds the tree's size, and
     /// with it the build's memory, on meshes that the SAH would duplicate without end (long slivers in a
-    /// bundle). Real models have some 5; with a `traversal_cost` near 1 they would have 10.
+    /// bundle). Real models have some 5; with a `traversal_cost` near 1 they would have 10. Start
+    /// from 8; `--memory` lowers it to what fits.
     pub max_duplication: f32,
     /// A subtree of at most this many triangles is a page, in which a tile of rays looks at all
     /// triangles at once. Raising it saves tiles steps and costs them tests; 64 is a good start.

@@ -1,0 +1,177 @@
+//! `raypack tune` and what a tuner looks at, from end to end.
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// A folder with a small plant in it.
+struct Place(TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let place = Self(tempfile::tempdir().expect("a folder"));
+        place.raypack("generate plant --triangles 10k -o plant.ply").assert().success();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn raypack(&self, arguments: &str) -> Command {
+        let mut command = Command::cargo_bin("raypack").expect("it was built");
+        command.current_dir(self.0.path()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
+        command
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&fs::read_to_string(self.path(name)).expect("written")).expect("JSON")
+    }
+}
+
+#[test]
+fn a_search_writes_a_profile_that_render_takes() {
+    let place = Place::new();
+    place
+        .raypack("tune plant.ply -o mine.toml --minutes 0.1 --size 48x48 --rays frame,ao --json r.json --plot p.svg")
+        .assert()
+        .success()
+        .stdout(predicate::str::contains("build.traversal_cost").and(predicate::str::contains("SAH")));
+
+    let report = place.json("r.json");
+    let measured = report["measured"].as_array().expect("a list");
+    assert!(!measured.is_empty(), "six seconds are enough for some candidates");
+    for candidate in measured {
+        let [low, time, high] = [0, 1, 2].map(|i| candidate["time"][i].as_f64().expect("a ratio"));
+        assert!(0.0 < low && low <= time && time <= high, "{candidate}");
+        assert!(candidate["pairs"].as_u64() >= Some(3), "{candidate}");
+        assert!(candidate["predicted"].as_f64().expect("a ratio") > 0.0, "{candidate}");
+    }
+    // What was taken is what the best has.
+    for value in report["values"].as_array().expect("a list") {
+        let taken = |m: &&Value| m["setting"] == value["setting"] && m["accepted"] == true;
+        let last = measured.iter().rfind(taken).map_or(&value["start"], |m| &m["value"]);
+        assert_eq!(last, &value["best"], "{value}");
+    }
+
+    let text = fs::read_to_string(place.path("mine.toml")).expect("written");
+    for part in ["[build]", "[render]", "[tuned]", "processor", "isa", "date", "seed", "[[tuned.steps]]"] {
+        assert!(text.contains(part), "{part} is missing");
+    }
+    let plot = fs::read_to_string(place.path("p.svg")).expect("written");
+    assert!(plot.starts_with("<svg") && plot.contains("What settings are worth"), "a plot");
+    place.raypack("render plant.ply --profile mine.toml -o a.png --size 32x32").assert().success();
+    let loaded = raypack::Profile::read(place.path("mine.toml")).expect("a profile");
+    assert_eq!(loaded.tuned.expect("what was measured").steps.len(), measured.len());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_search_writes_the_best_so_far() {
+    use std::time::{Duration, Instant};
+    let place = Place::new();
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
+    command.current_dir(place.0.path()).args(["tune", "plant.ply", "-o", "mine.toml", "--size", "48x48"]);
+    command.args(["--minutes", "60", "--json", "r.json"]).stdout(std::process::Stdio::null());
+    let mut child = command.spawn().expect("it runs");
+    // The handler is there once the model has been read; then an interrupt ends the search, not the process.
+    std::thread::sleep(Duration::from_secs(3));
+    let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupt.expect("kill runs").success());
+    let since = Instant::now();
+    let status = loop {
+        match child.try_wait().expect("a status") {
+            Some(status) => break status,
+            None if since.elapsed() > Duration::from_secs(120) => panic!("it goes on"),
+            None => std::thread::sleep(Duration::from_millis(50)),
+        }
+    };
+    assert!(status.success(), "{status}");
+    assert_eq!(place.json("r.json")["interrupted"], true);
+    raypack::Profile::read(place.path("mine.toml")).expect("a profile");
+}
+
+#[test]
+fn a_cap_on_memory_is_kept() {
+    let place = Place::new();
+    place
+        .raypack("tune plant.ply -o mine.toml --minutes 0.1 --size 32x32 --memory 64KiB")
+        .assert()
+        .failure()
+        .stderr(predicate::str::contains("--memory: the model takes"));
+    assert!(!place.path("mine.toml").exists());
+}
+
+#[test]
+fn bad_options_are_one_line_and_leave_nothing() {
+    let place = Place::new();
+    for (options, expected) in [
+        ("-o mine.txt", "mine.txt: unknown kind of file"),
+        ("-o no/such/folder/mine.toml", "cannot write no/such/folder/mine.toml"),
+        ("-o mine.toml --minutes 0", "--minutes: 0 is not a time to search"),
+        ("-o mine.toml --minutes -1", "--minutes: -1 is not a time"),
+        ("-o mine.toml --goal speed", "--goal: \"speed\" is neither trace nor frames=N"),
+        ("-o mine.toml --goal frames=0", "--goal: \"frames=0\""),
+        ("-o mine.toml --rays frames", "frames"),
+        ("-o mine.toml --camera eye=1", "--camera"),
+        ("-o mine.toml --plot p.pdf", "p.pdf: unknown kind of file"),
+        ("-o mine.toml --plot mine.toml", "unknown kind of file"),
+        ("-o mine.toml --json mine.toml", "--json: this file is named twice"),
+        ("-o mine.toml --profile nonsense", "profiles/nonsense.toml"),
+    ] {
+        let run = place.raypack(&format!("tune plant.ply {options}")).assert().failure();
+        let message = String::from_utf8(run.get_output().stderr.clone()).expect("text");
+        assert!(message.contains(expected) && message.lines().count() == 1, "{options}: {message}");
+        assert!(!place.path("mine.toml").exists(), "{options}");
+    }
+}
+
+#[test]
+fn heat_maps_are_pictures_of_costs() {
+    let place = Place::new();
+    for cost in ["steps", "tests", "leaves", "time"] {
+        place
+            .raypack(&format!("render plant.ply -o {cost}.pfm --size 40x30 --heatmap {cost} --json {cost}.json"))
+            .assert()
+            .success()
+            .stdout(predicate::str::contains("traced alone"));
+        let bytes = fs::read(place.path(&format!("{cost}.pfm"))).expect("written");
+        let header = b"Pf\n40 30\n-1.0\n";
+        assert!(bytes.starts_with(header), "{cost}");
+        let (costs, rest) = bytes[header.len()..].as_chunks::<4>();
+        assert!(costs.len() == 1200 && rest.is_empty());
+        let greatest = costs.iter().fold(0.0, |most: f32, cost| most.max(f32::from_le_bytes(*cost)));
+        let spread = &place.json(&format!("{cost}.json"))["spread"];
+        assert_eq!(spread["greatest"].as_f64(), Some(f64::from(greatest)), "{cost}");
+        assert!(greatest > 1.0, "{cost}: {greatest}");
+    }
+    place.raypack("render plant.ply -o heat.png --size 40x30 --heatmap tests").assert().success();
+    let picture = image::open(place.path("heat.png")).expect("a picture").to_rgb8();
+    assert_eq!(picture.dimensions(), (40, 30));
+    assert!(picture.pixels().any(|pixel| pixel != picture.get_pixel(0, 0)), "it shows something");
+    place
+        .raypack("render plant.ply -o heat.png --heatmap warmth")
+        .assert()
+        .failure()
+        .stderr(predicate::str::contains("--heatmap: \"warmth\" is not one of steps"));
+}
+
+#[test]
+fn info_draws_what_a_tuner_looks_at() {
+    let place = Place::new();
+    let drawn = place.raypack("info plant.ply --json i.json").assert().success();
+    let text = String::from_utf8(drawn.get_output().stdout.clone()).expect("text");
+    for title in ["leaf size", "depth", "in leaves", "area", "aspect"] {
+        assert!(text.lines().any(|line| line.starts_with(title)), "{title}: {text}");
+    }
+    assert!(text.contains("expected to take") && text.contains("random ones"), "{text}");
+    let report = place.json("i.json");
+    let sum = |list: &Value| -> u64 { list.as_array().expect("a list").iter().filter_map(Value::as_u64).sum() };
+    assert_eq!(Some(sum(&report["tree"]["depth_histogram"])), report["tree"]["leaves"].as_u64());
+    let without_area = report["shapes"]["without_area"].as_u64().expect("a number");
+    assert_eq!(Some(sum(&report["shapes"]["by_area"]) + without_area), report["triangles"].as_u64());
+    assert!(report["random_rays"]["tests"].as_f64() > Some(0.0));
+}
