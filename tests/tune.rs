@@ -134,7 +134,9 @@ fn heat_maps_are_pictures_of_costs() {
     let place = Place::new();
     for cost in ["steps", "tests", "leaves", "time"] {
         place
-            .raypack(&format!("render plant.ply -o {cost}.pfm --size 40x30 --heatmap {cost} --json {cost}.json"))
+            .raypack(&format!(
+                "render plant.ply -o {cost}.pfm --size 40x30 --heatmap {cost} --json {cost}.json"
+            ))
             .assert()
             .success()
             .stdout(predicate::str::contains("traced alone"));
@@ -169,7 +171,8 @@ fn info_draws_what_a_tuner_looks_at() {
     }
     assert!(text.contains("expected to take") && text.contains("random ones"), "{text}");
     let report = place.json("i.json");
-    let sum = |list: &Value| -> u64 { list.as_array().expect("a list").iter().filter_map(Value::as_u64).sum() };
+    let sum =
+        |list: &Value| -> u64 { list.as_array().expect("a list").iter().filter_map(Value::as_u64).sum() };
     assert_eq!(Some(sum(&report["tree"]["depth_histogram"])), report["tree"]["leaves"].as_u64());
     let without_area = report["shapes"]["without_area"].as_u64().expect("a number");
     assert_eq!(Some(sum(&report["shapes"]["by_area"]) + without_area), report["triangles"].as_u64());
