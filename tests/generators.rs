@@ -2,7 +2,8 @@
 
 use raypack::mesh::generate::plant::{self, PlantParams};
 use raypack::mesh::generate::shapes;
-use raypack::mesh::{Colors, Mesh};
+use raypack::mesh::{self, Colors, Mesh, ply};
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 /// FNV-1a over everything that makes up a mesh.
@@ -52,6 +53,44 @@ fn the_smallest_plants_are_sound_too() {
         assert!(mesh.triangles.len() as u64 <= triangles.max(24));
         assert_sound(&mesh);
     }
+}
+
+#[test]
+fn a_streamed_plant_is_the_one_in_memory_byte_for_byte() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [streamed, whole] = ["streamed.ply", "whole.ply"].map(|name| folder.path().join(name));
+    for (triangles, seed) in [(24, 1), (10_000, 1), (60_000, 2), (300_000, 3), (1_000_000, 1)] {
+        let params = PlantParams { triangles, seed };
+        let mesh = plant::generate(params);
+        ply::write(&whole, &mesh).expect("written");
+        let told = RefCell::new(vec![0.0]);
+        let size = plant::write(&streamed, params, &|part| told.borrow_mut().push(part)).expect("written");
+        let bytes = |path| std::fs::read(path).expect("readable");
+        assert!(bytes(&streamed) == bytes(&whole), "{params:?}");
+        assert_eq!(size, plant::size(params));
+        assert_eq!(size.triangles, mesh.triangles.len() as u64);
+        assert_eq!(size.vertices, mesh.positions.len() as u64);
+        let told = told.into_inner();
+        assert!(told.is_sorted() && told.len() > 2 && told.last() <= Some(&1.0), "{told:?}");
+    }
+    let read = mesh::read(&streamed).expect("well-formed");
+    let mesh = plant::generate(PlantParams { triangles: 1_000_000, seed: 1 });
+    assert_eq!((read.mesh.positions, read.mesh.triangles), (mesh.positions, mesh.triangles));
+    assert_eq!(read.report.summary(), "", "there is nothing to repair");
+}
+
+#[test]
+fn a_streamed_plant_that_cannot_be_written_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let params = PlantParams { triangles: 10_000, seed: 1 };
+    let path = folder.path().join("taken.ply");
+    std::fs::create_dir(&path).expect("created");
+    for path in [path, folder.path().join("no/plant.ply")] {
+        let message = plant::write(&path, params, &|_| {}).expect_err("it cannot be written").to_string();
+        assert!(message.starts_with(&format!("cannot write {}: ", path.display())), "{message}");
+        assert!(!message.contains('\n'), "{message}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 1);
 }
 
 #[test]
