@@ -7,8 +7,8 @@ use std::path::Path;
 use tempfile::NamedTempFile;
 
 /// Writes a file through `fill`: into a temporary file beside the target, which takes the
-/// target's name when it is complete. What `path` held before stays until then; on failure
-/// nothing is left behind.
+/// target's name when it is complete and on the disk. What `path` held before stays until then; on
+/// failure nothing is left behind.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -19,7 +19,11 @@ pub fn write_whole(
     let write = || {
         let mut out = BufWriter::with_capacity(1 << 18, beside(path)?);
         fill(&mut out)?;
-        out.into_inner()?.persist(path)?;
+        let file = out.into_inner()?;
+        // Some file systems find no room only now; and a name must not outlive a power cut that its
+        // bytes did not.
+        file.as_file().sync_data()?;
+        file.persist(path)?;
         Ok(())
     };
     write().map_err(|source| Error::Write { path: path.into(), source })
