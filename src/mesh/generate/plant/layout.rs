@@ -3,7 +3,7 @@
 use super::palette::{ASPHALT, BLUE, CONCRETE, EARTH, GALVANISED, MARKING, ORANGE, RED, SILVER, STEEL};
 use super::piping::Rack;
 use super::units::{PLOT, Unit};
-use super::{PlantParams, quality};
+use super::{PlantParams, cables, quality};
 use crate::mesh::generate::part::Part;
 use crate::mesh::generate::rng::Rng;
 use crate::mesh::generate::sketch::Sketch;
@@ -97,6 +97,14 @@ fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, i: i32, k: i32) {
     sketch.cuboid(Vec3::new(-half, -0.2, PLOT_Z - half), Vec3::new(half, 0.15, PLOT_Z + half));
     sketch.origin = corner + Vec3::Z * RACK_Z;
     rack.draw(sketch, &mut rng);
+    let mut of_cables = Rng::new(seed, !cell_key(i, k));
+    for x in Rack::columns() {
+        if of_cables.chance(0.5) {
+            cables::drop(sketch, &mut of_cables, x);
+        }
+    }
+    sketch.origin = corner;
+    cables::lamp_post(sketch, ROAD_Z + 3.6);
     sketch.origin = corner + Vec3::Z * PLOT_Z;
     // Neighbours differ: a walk through the list in steps that the seed chooses, with exceptions.
     let step = 1 + 2 * Rng::new(seed, 7).below(4);

@@ -4,9 +4,12 @@
 //! laid out in cells of one unit and its stretch of pipe rack, in a spiral from the middle, as many
 //! as fit the number of triangles asked for; storage yards of drums and pipes fill what is left.
 
+mod cables;
+mod grating;
 mod layout;
 mod palette;
 mod piping;
+mod plates;
 mod steel;
 mod units;
 mod vessels;
@@ -95,8 +98,11 @@ fn quality(triangles: u64) -> f32 {
     match triangles {
         0..50_000 => 0.4,
         50_000..150_000 => 0.65,
-        150_000..1_000_000 => 1.0,
+        150_000..1_000_000 => 0.93,
         1_000_000..8_000_000 => 1.4,
         _ => 1.8,
     }
 }
+
+#[cfg(test)]
+mod tests;
