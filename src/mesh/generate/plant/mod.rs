@@ -1,4 +1,8 @@
-//! A process plant: tanks, columns, spheres, furnaces and steel structures between pipe racks.
+//! A process plant: tanks, columns, spheres, furnaces and steel structures between pipe racks, with the
+//! stairs, gratings and cables that belong to them.
+//!
+//! Its triangles are as those of models that engineers draw: many long and thin, tiny ones (bolts) beside
+//! huge ones (the ground), and some that coincide, where two parts touch or both bring the same plate.
 //!
 //! Y is up, lengths are metres, the ground is at 0 and the plant is centred on the origin. It is
 //! laid out in cells of one unit and its stretch of pipe rack, in a spiral from the middle, as many
