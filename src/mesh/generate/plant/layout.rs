@@ -41,8 +41,16 @@ pub(super) fn parts<E>(
         }
         sketch.clear();
         sketch.origin = Vec3::new(i as f32 * CELL_X, 0.0, k as f32 * CELL_Z);
-        draw_cell(&mut sketch, params.seed, number, i, k);
+        draw_cell(&mut sketch, params.seed, number, (i, k), None);
         reach = i.abs().max(k.abs());
+        // The smallest plants have one unit, which is not of any kind: the first that there is room for.
+        let mut others = Unit::ALL.iter().take(if number == 0 { Unit::ALL.len() } else { 0 });
+        while done + sketch.len() + RESERVE > target
+            && let Some(unit) = others.next()
+        {
+            sketch.clear();
+            draw_cell(&mut sketch, params.seed, number, (i, k), Some(*unit));
+        }
         if done + sketch.len() + RESERVE <= target {
             done += sketch.len();
             each(sketch.part())?;
@@ -83,7 +91,9 @@ fn cell_key(i: i32, k: i32) -> u64 {
     ((i as u32 as u64) << 32 | k as u32 as u64).wrapping_add(1 << 16)
 }
 
-fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, i: i32, k: i32) {
+/// Draws the cell that comes `number`th: its stretch of rack and road, and `unit`, or else the one whose
+/// turn it is.
+fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, (i, k): (i32, i32), unit: Option<Unit>) {
     let mut rng = Rng::new(seed, cell_key(i, k));
     let rack = Rack::new(&mut Rng::new(seed, cell_key(i32::MIN, k)));
     let corner = sketch.origin;
@@ -109,8 +119,8 @@ fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, i: i32, k: i32) {
     // Neighbours differ: a walk through the list in steps that the seed chooses, with exceptions.
     let step = 1 + 2 * Rng::new(seed, 7).below(4);
     let next = Unit::ALL[number.wrapping_mul(step) % Unit::ALL.len()];
-    let unit = if rng.chance(0.2) { rng.pick(&Unit::ALL) } else { next };
-    unit.draw(sketch, &mut rng, &rack, RACK_Z - PLOT_Z);
+    let turn = if rng.chance(0.2) { rng.pick(&Unit::ALL) } else { next };
+    unit.unwrap_or(turn).draw(sketch, &mut rng, &rack, RACK_Z - PLOT_Z);
 }
 
 /// A storage yard of not more than `triangles`: drums, pipes and crates in rows.
