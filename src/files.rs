@@ -1,25 +1,27 @@
 //! Files that are whole or not there at all.
 
 use crate::error::{Error, Result};
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::Path;
 use tempfile::NamedTempFile;
 
 /// Writes a file through `fill`: into a temporary file beside the target, which takes the
-/// target's name when it is complete. What `path` held before stays until then; on failure
-/// nothing is left behind.
+/// target's name when it is complete and on the disk. What `path` held before stays until then; on
+/// failure nothing is left behind.
 ///
 /// # Errors
 /// [`Error::Write`].
-pub fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<NamedTempFile>) -> io::Result<()>,
-) -> Result<()> {
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
     let write = || {
-        let mut out = BufWriter::with_capacity(1 << 18, beside(path)?);
+        let temporary = beside(path)?;
+        // The file itself: tempfile would put its own path into every error.
+        let mut out = BufWriter::with_capacity(1 << 18, temporary.as_file().try_clone()?);
         fill(&mut out)?;
-        out.into_inner()?.persist(path)?;
+        // Some file systems find no room only now; and a name must not outlive a power cut that its
+        // bytes did not.
+        out.into_inner()?.sync_data()?;
+        temporary.persist(path)?;
         Ok(())
     };
     write().map_err(|source| Error::Write { path: path.into(), source })

@@ -433,6 +433,7 @@ mod bad_input {
             place.fail(&format!("render house.ply -o a.png {option}"), &[expected]);
         }
         place.fail("generate plant -o a.ply --triangles 12", &["--triangles: \"12\""]);
+        place.fail("generate plant -o a.ply --triangles 201M", &["--triangles: \"201M\"", "200,000,000"]);
         let mut command = place.raypack("render house.ply -o a.png");
         command.env("RAYPACK_ISA", "sse9");
         place.fail_with(command, "RAYPACK_ISA=sse9", &["RAYPACK_ISA", "portable"]);

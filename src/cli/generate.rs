@@ -1,16 +1,13 @@
 //! `raypack generate plant -o plant.ply`: models of any size.
 
+use super::progress::Bar;
 use super::report::{Json, Lines, bytes, duration, grouped};
 use crate::error::{Error, Result};
 use crate::files::check_writable;
-use crate::mesh::generate::plant::{self, PlantParams};
-use crate::mesh::ply;
+use crate::mesh::generate::plant::{self, PlantParams, TRIANGLES};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// The numbers of triangles that the plant can be made of.
-const TRIANGLES: std::ops::RangeInclusive<u64> = 10_000..=30_000_000;
 
 /// Make a model by rule, for tests of any size
 #[derive(Clone, Debug, clap::Args)]
@@ -24,10 +21,10 @@ enum What {
     Plant(PlantArgs),
 }
 
-/// A process plant of pipes, tanks, columns, racks and stairs
+/// A process plant of pipes, tanks, columns, girders, gratings, stairs and cables
 #[derive(Clone, Debug, clap::Args)]
 struct PlantArgs {
-    /// About how many triangles: a number such as 300000, 300k or 12.7M
+    /// About how many triangles: a number such as 300000, 300k or 12.7M, up to 200M
     #[arg(long, value_name = "N", default_value = "300k")]
     triangles: String,
     /// Which of the plants of that size
@@ -43,8 +40,8 @@ struct PlantArgs {
 #[derive(Debug, Serialize)]
 struct Report<'a> {
     file: &'a Path,
-    triangles: usize,
-    vertices: usize,
+    triangles: u64,
+    vertices: u64,
     seed: u64,
     seconds: f64,
     bytes: u64,
@@ -71,23 +68,25 @@ fn plant(args: &PlantArgs) -> Result<()> {
     args.json.check()?;
 
     let start = Instant::now();
-    let mesh = plant::generate(PlantParams { triangles, seed: args.seed });
+    let bar = Bar::new("generating");
+    let params = PlantParams { triangles, seed: args.seed };
+    let plant = plant::write(&args.output, params, &|fraction| bar.set(fraction))?;
+    drop(bar);
     let seconds = start.elapsed().as_secs_f64();
-    ply::write(&args.output, &mesh)?;
     let size = std::fs::metadata(&args.output).map_or(0, |file| file.len());
 
     let report = Report {
         file: &args.output,
-        triangles: mesh.triangles.len(),
-        vertices: mesh.positions.len(),
+        triangles: plant.triangles,
+        vertices: plant.vertices,
         seed: args.seed,
         seconds,
         bytes: size,
     };
     let mut lines = Lines::default();
-    let [triangles, vertices] = [report.triangles, report.vertices].map(|n| grouped(n as u64));
+    let [triangles, vertices] = [report.triangles, report.vertices].map(grouped);
     lines.add("triangles", format!("{triangles} with {vertices} vertices"));
-    lines.add("generated", duration(seconds));
+    lines.add("generated", format!("{}, writing included", duration(seconds)));
     lines.add("wrote", format!("{}, {}", args.output.display(), bytes(size)));
     args.json.give(lines.text(), &report)
 }
@@ -118,11 +117,11 @@ mod tests {
     #[test]
     fn counts_may_have_suffixes() {
         for (text, expected) in
-            [("10000", 10_000), ("300k", 300_000), ("12.7M", 12_700_000), ("1e6", 1_000_000)]
+            [("10000", 10_000), ("300k", 300_000), ("12.7M", 12_700_000), ("200M", 200_000_000)]
         {
             assert_eq!(count(text).expect(text), expected);
         }
-        for text in ["", "k", "-5M", "0", "9999", "31M", "nan", "inf", "3G", "12,7M"] {
+        for text in ["", "k", "-5M", "0", "9999", "201M", "nan", "inf", "3G", "12,7M"] {
             let message = count(text).expect_err(text).to_string();
             assert!(message.starts_with("--triangles: ") && !message.contains('\n'), "{message}");
         }

@@ -1,9 +1,9 @@
-//! Drawing with solids: boxes, tubes and surfaces of revolution that become one mesh.
+//! Drawing with solids: boxes, tubes and surfaces of revolution that become a part of a model.
 
-use crate::mesh::{Colors, Material, Mesh};
+use super::part::Part;
 use glam::{DVec2, Vec2, Vec3};
 
-/// A mesh under construction, one material at a time.
+/// A part of a model under construction, one material at a time.
 ///
 /// Everything drawn is moved by `origin` and coloured with `paint`. All solids face outwards.
 #[derive(Debug, Default)]
@@ -29,34 +29,16 @@ impl Sketch {
         self.triangles.len()
     }
 
-    /// Forgets all but the first `triangles` triangles and `vertices` vertices.
-    pub fn truncate(&mut self, (triangles, vertices): (usize, usize)) {
-        self.triangles.truncate(triangles);
-        self.of_triangle.truncate(triangles);
-        self.positions.truncate(vertices);
+    /// Forgets what was drawn, and keeps its memory for what comes next.
+    pub fn clear(&mut self) {
+        self.positions.clear();
+        self.triangles.clear();
+        self.of_triangle.clear();
     }
 
-    /// What [`Self::truncate`] needs to come back to here.
-    pub fn mark(&self) -> (usize, usize) {
-        (self.triangles.len(), self.positions.len())
-    }
-
-    /// Makes room for so many triangles.
-    pub fn reserve(&mut self, triangles: usize) {
-        self.triangles.reserve_exact(triangles);
-        self.of_triangle.reserve_exact(triangles);
-        // Boxes have two vertices for three triangles, tubes one for two.
-        self.positions.reserve(triangles * 2 / 3);
-    }
-
-    /// The mesh that was drawn.
-    pub fn finish(mut self, materials: Vec<Material>) -> Mesh {
-        self.positions.shrink_to_fit();
-        Mesh {
-            positions: self.positions,
-            triangles: self.triangles,
-            colors: Colors::PerMaterial { materials, of_triangle: self.of_triangle },
-        }
+    /// What was drawn.
+    pub fn part(&self) -> Part<'_> {
+        Part { positions: &self.positions, triangles: &self.triangles, of_triangle: &self.of_triangle }
     }
 
     /// How many sides something round of this radius gets: more the larger it is.
@@ -241,11 +223,9 @@ mod tests {
     fn volume(draw: impl FnOnce(&mut Sketch)) -> f64 {
         let mut sketch = Sketch::new(4.0);
         draw(&mut sketch);
-        let mesh = sketch.finish(Vec::new());
-        let six: f64 = (0..mesh.triangles.len() as u32)
-            .map(|i| mesh.corners(i).map(Vec3::as_dvec3))
-            .map(|[a, b, c]| a.dot(b.cross(c)))
-            .sum();
+        let part = sketch.part();
+        let corner = |i: u32| part.positions[i as usize].as_dvec3();
+        let six: f64 = part.triangles.iter().map(|t| t.map(corner)).map(|[a, b, c]| a.dot(b.cross(c))).sum();
         six / 6.0
     }
 

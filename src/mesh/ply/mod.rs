@@ -14,8 +14,10 @@
 mod body;
 mod elements;
 mod header;
+mod parts;
 mod write;
 
+pub use parts::PartWriter;
 pub use write::write;
 
 use super::color;

@@ -2,9 +2,15 @@
 
 use crate::error::Result;
 use crate::files;
-use crate::mesh::{Colors, Mesh, color};
+use crate::mesh::{Colors, Material, Mesh, color};
+use glam::Vec3;
 use std::io::{self, Write};
 use std::path::Path;
+
+/// Bytes of a vertex without a colour.
+pub(super) const VERTEX: u64 = 12;
+/// Bytes of a triangle with its colour.
+pub(super) const FACE: u64 = 16;
 
 /// Writes `mesh` as little-endian binary PLY, with a colour for each face (for each vertex, if
 /// that is what the mesh has).
@@ -17,59 +23,75 @@ use std::path::Path;
 /// [`Error::Write`](crate::Error::Write).
 pub fn write(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     files::write_whole(path.as_ref(), |out| {
-        header(mesh, out)?;
-        vertices(mesh, out)?;
+        let per_vertex = matches!(mesh.colors, Colors::PerVertex(_));
+        let header = header(mesh.positions.len() as u64, mesh.triangles.len() as u64, per_vertex);
+        out.write_all(header.as_bytes())?;
+        match &mesh.colors {
+            Colors::PerVertex(colors) => {
+                for (p, color) in mesh.positions.iter().zip(colors) {
+                    vertex(out, *p)?;
+                    out.write_all(color)?;
+                }
+            }
+            _ => mesh.positions.iter().try_for_each(|&p| vertex(out, p))?,
+        }
         faces(mesh, out)
     })
 }
 
-fn header(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// The header, to its last line's end.
+pub(super) fn header(vertices: u64, triangles: u64, per_vertex: bool) -> String {
     const COLOR: &str = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-    let per_vertex = matches!(mesh.colors, Colors::PerVertex(_));
-    write!(
-        out,
-        "ply\nformat binary_little_endian 1.0\ncomment raypack {}\nelement vertex {}\n\
+    format!(
+        "ply\nformat binary_little_endian 1.0\ncomment raypack {}\nelement vertex {vertices}\n\
          property float x\nproperty float y\nproperty float z\n{}\
-         element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
+         element face {triangles}\nproperty list uchar int vertex_indices\n{}end_header\n",
         env!("CARGO_PKG_VERSION"),
-        mesh.positions.len(),
         if per_vertex { COLOR } else { "" },
-        mesh.triangles.len(),
         if per_vertex { "" } else { COLOR },
     )
 }
 
-fn vertices(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
-    for (i, p) in mesh.positions.iter().enumerate() {
-        for x in p.to_array() {
-            out.write_all(&x.to_le_bytes())?;
-        }
-        if let Colors::PerVertex(colors) = &mesh.colors {
-            out.write_all(&colors[i])?;
-        }
+/// One vertex: [`VERTEX`] bytes.
+#[inline]
+pub(super) fn vertex(out: &mut impl Write, position: Vec3) -> io::Result<()> {
+    let mut record = [0; VERTEX as usize];
+    for (bytes, x) in record.as_chunks_mut::<4>().0.iter_mut().zip(position.to_array()) {
+        *bytes = x.to_le_bytes();
     }
-    Ok(())
+    out.write_all(&record)
+}
+
+/// One triangle: [`FACE`] bytes, or three fewer if it has no colour.
+#[inline]
+pub(super) fn face(out: &mut impl Write, triangle: [u32; 3], shade: Option<[u8; 3]>) -> io::Result<()> {
+    let mut record = [3; FACE as usize];
+    for (bytes, index) in record[1..13].as_chunks_mut::<4>().0.iter_mut().zip(triangle) {
+        *bytes = index.to_le_bytes();
+    }
+    record[13..].copy_from_slice(&shade.unwrap_or_default());
+    out.write_all(&record[..if shade.is_some() { 16 } else { 13 }])
+}
+
+/// The materials' colours as bytes.
+pub(super) fn shades(materials: &[Material]) -> Vec<[u8; 3]> {
+    materials.iter().map(|m| color::encode(m.diffuse)).collect()
 }
 
 fn faces(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     let palette: Vec<[u8; 3]> = match &mesh.colors {
         Colors::Uniform(linear) => vec![color::encode(*linear)],
-        Colors::PerMaterial { materials, .. } => materials.iter().map(|m| color::encode(m.diffuse)).collect(),
+        Colors::PerMaterial { materials, .. } => shades(materials),
         Colors::PerTriangle(_) | Colors::PerVertex(_) => Vec::new(),
     };
     for (i, triangle) in mesh.triangles.iter().enumerate() {
-        let mut record = [3; 16];
-        for (bytes, index) in record[1..13].as_chunks_mut::<4>().0.iter_mut().zip(triangle) {
-            *bytes = index.to_le_bytes();
-        }
         let shade = match &mesh.colors {
             Colors::Uniform(_) => Some(palette[0]),
             Colors::PerTriangle(colors) => Some(colors[i]),
             Colors::PerMaterial { of_triangle, .. } => Some(palette[of_triangle[i] as usize]),
             Colors::PerVertex(_) => None,
         };
-        record[13..].copy_from_slice(&shade.unwrap_or_default());
-        out.write_all(&record[..if shade.is_some() { 16 } else { 13 }])?;
+        face(out, *triangle, shade)?;
     }
     Ok(())
 }

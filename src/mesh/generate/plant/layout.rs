@@ -1,9 +1,10 @@
 //! Where things stand: cells in a spiral, and yards that make up the number.
 
-use super::PlantParams;
 use super::palette::{ASPHALT, BLUE, CONCRETE, EARTH, GALVANISED, MARKING, ORANGE, RED, SILVER, STEEL};
 use super::piping::Rack;
 use super::units::{PLOT, Unit};
+use super::{PlantParams, cables, quality};
+use crate::mesh::generate::part::Part;
 use crate::mesh::generate::rng::Rng;
 use crate::mesh::generate::sketch::Sketch;
 use glam::Vec3;
@@ -23,35 +24,56 @@ const RESERVE: usize = 24;
 /// The most triangles that a stack in a yard takes.
 const STACKS: usize = 81;
 
-/// Draws cells until the number of triangles is reached.
-pub(super) fn fill(sketch: &mut Sketch, params: PlantParams) {
+/// Draws the plant part by part: cells until the number of triangles is reached, then yards, then the
+/// ground. No more than one part is in memory at a time; `each` is lent it before the next is drawn.
+pub(super) fn parts<E>(
+    params: PlantParams,
+    mut each: impl FnMut(Part<'_>) -> Result<(), E>,
+) -> Result<(), E> {
     let target = params.triangles as usize;
+    let mut sketch = Sketch::new(quality(params.triangles));
+    let mut done = 0;
     let mut reach = 0;
     let mut yards = Vec::new();
     for (number, (i, k)) in spiral().enumerate() {
-        if sketch.len() + RESERVE >= target {
+        if done + RESERVE >= target {
             break;
         }
-        let mark = sketch.mark();
+        sketch.clear();
         sketch.origin = Vec3::new(i as f32 * CELL_X, 0.0, k as f32 * CELL_Z);
-        draw_cell(sketch, params.seed, number, i, k);
+        draw_cell(&mut sketch, params.seed, number, (i, k), None);
         reach = i.abs().max(k.abs());
-        if sketch.len() + RESERVE > target {
-            // The cell is too much: it becomes a yard, as do those after it.
-            sketch.truncate(mark);
-            yards.push((i, k));
-            if yards.len() > usize::from(number > 0) * 4 {
-                break;
-            }
+        // The smallest plants have one unit, which is not of any kind: the first that there is room for.
+        let mut others = Unit::ALL.iter().take(if number == 0 { Unit::ALL.len() } else { 0 });
+        while done + sketch.len() + RESERVE > target
+            && let Some(unit) = others.next()
+        {
+            sketch.clear();
+            draw_cell(&mut sketch, params.seed, number, (i, k), Some(*unit));
+        }
+        if done + sketch.len() + RESERVE <= target {
+            done += sketch.len();
+            each(sketch.part())?;
+            continue;
+        }
+        // The cell is too much: it becomes a yard, as do those after it.
+        yards.push((i, k));
+        if yards.len() > usize::from(number > 0) * 4 {
+            break;
         }
     }
     for (n, &(i, k)) in yards.iter().enumerate() {
-        let share = (target - sketch.len().min(target)).saturating_sub(RESERVE) / (yards.len() - n);
+        let share = (target - done.min(target)).saturating_sub(RESERVE) / (yards.len() - n);
+        sketch.clear();
         sketch.origin = Vec3::new(i as f32 * CELL_X, 0.0, k as f32 * CELL_Z + PLOT_Z);
         let mut rng = Rng::new(params.seed, cell_key(i, k));
-        yard(sketch, &mut rng, share);
+        yard(&mut sketch, &mut rng, share);
+        done += sketch.len();
+        each(sketch.part())?;
     }
-    ground(sketch, reach);
+    sketch.clear();
+    ground(&mut sketch, reach);
+    each(sketch.part())
 }
 
 /// Cells in the order of their distance from the middle one, ring by ring.
@@ -69,7 +91,9 @@ fn cell_key(i: i32, k: i32) -> u64 {
     ((i as u32 as u64) << 32 | k as u32 as u64).wrapping_add(1 << 16)
 }
 
-fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, i: i32, k: i32) {
+/// Draws the cell that comes `number`th: its stretch of rack and road, and `unit`, or else the one whose
+/// turn it is.
+fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, (i, k): (i32, i32), unit: Option<Unit>) {
     let mut rng = Rng::new(seed, cell_key(i, k));
     let rack = Rack::new(&mut Rng::new(seed, cell_key(i32::MIN, k)));
     let corner = sketch.origin;
@@ -83,20 +107,27 @@ fn draw_cell(sketch: &mut Sketch, seed: u64, number: usize, i: i32, k: i32) {
     sketch.cuboid(Vec3::new(-half, -0.2, PLOT_Z - half), Vec3::new(half, 0.15, PLOT_Z + half));
     sketch.origin = corner + Vec3::Z * RACK_Z;
     rack.draw(sketch, &mut rng);
+    let mut of_cables = Rng::new(seed, !cell_key(i, k));
+    for x in Rack::columns() {
+        if of_cables.chance(0.5) {
+            cables::drop(sketch, &mut of_cables, x);
+        }
+    }
+    sketch.origin = corner;
+    cables::lamp_post(sketch, ROAD_Z + 3.6);
     sketch.origin = corner + Vec3::Z * PLOT_Z;
     // Neighbours differ: a walk through the list in steps that the seed chooses, with exceptions.
     let step = 1 + 2 * Rng::new(seed, 7).below(4);
     let next = Unit::ALL[number.wrapping_mul(step) % Unit::ALL.len()];
-    let unit = if rng.chance(0.2) { rng.pick(&Unit::ALL) } else { next };
-    unit.draw(sketch, &mut rng, &rack, RACK_Z - PLOT_Z);
+    let turn = if rng.chance(0.2) { rng.pick(&Unit::ALL) } else { next };
+    unit.unwrap_or(turn).draw(sketch, &mut rng, &rack, RACK_Z - PLOT_Z);
 }
 
 /// A storage yard of not more than `triangles`: drums, pipes and crates in rows.
 fn yard(sketch: &mut Sketch, rng: &mut Rng, triangles: usize) {
-    let end = sketch.len() + triangles;
     let mut place = 0;
     // Rows of heaps, one upon the other when the plot is full.
-    while sketch.len() + STACKS.max(8 * sketch.sides(0.3)) <= end {
+    while sketch.len() + STACKS.max(8 * sketch.sides(0.3)) <= triangles {
         let (column, row, layer) = (place % 20, place / 20 % 20, place / 400);
         let spread = 1.15;
         let at = Vec3::new((column as f32 - 9.5) * spread, 0.95 * layer as f32, (row as f32 - 9.5) * spread);

@@ -1,24 +1,39 @@
-//! A process plant: tanks, columns, spheres, furnaces and steel structures between pipe racks.
+//! A process plant: tanks, columns, spheres, furnaces and steel structures between pipe racks, with the
+//! stairs, gratings and cables that belong to them.
+//!
+//! Its triangles are as those of models that engineers draw: many long and thin, tiny ones (bolts) beside
+//! huge ones (the ground), and some that coincide, where two parts touch or both bring the same plate.
 //!
 //! Y is up, lengths are metres, the ground is at 0 and the plant is centred on the origin. It is
 //! laid out in cells of one unit and its stretch of pipe rack, in a spiral from the middle, as many
 //! as fit the number of triangles asked for; storage yards of drums and pipes fill what is left.
 
+mod cables;
+mod grating;
 mod layout;
 mod palette;
 mod piping;
+mod plates;
 mod steel;
 mod units;
 mod vessels;
+mod write;
 
-use super::sketch::Sketch;
+use super::part::{Part, Size, Whole};
 use crate::mesh::Mesh;
 use glam::Vec3;
+use std::convert::Infallible;
+use std::ops::RangeInclusive;
+
+pub use write::write;
+
+/// The numbers of triangles that a plant comes within 5 % of.
+pub const TRIANGLES: RangeInclusive<u64> = 10_000..=200_000_000;
 
 /// What plant to make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlantParams {
-    /// How many triangles it shall have, which it will within 5 % (from 10,000 to 30 million).
+    /// How many triangles it shall have; if that is in [`TRIANGLES`], it will within 5 %.
     pub triangles: u64,
     /// Which of the plants of that size.
     pub seed: u64,
@@ -26,10 +41,32 @@ pub struct PlantParams {
 
 /// A plant of about `params.triangles` triangles. The same parameters give the same plant.
 pub fn generate(params: PlantParams) -> Mesh {
-    let mut sketch = Sketch::new(quality(params.triangles));
-    sketch.reserve(params.triangles as usize);
-    layout::fill(&mut sketch, params);
-    sketch.finish(palette::materials())
+    let mut whole = Whole::with_capacity(params.triangles as usize);
+    let Ok(()) = parts::<Infallible>(params, |part| {
+        whole.push(part);
+        Ok(())
+    });
+    whole.finish(palette::materials())
+}
+
+/// The same plant, part by part: `each` is lent one part after the other, of not more than some hundred
+/// thousand triangles however large the plant is. Their order is the mesh's.
+///
+/// # Errors
+///
+/// The first that `each` gives; nothing more is made then.
+pub fn parts<E>(params: PlantParams, each: impl FnMut(Part<'_>) -> Result<(), E>) -> Result<(), E> {
+    layout::parts(params, each)
+}
+
+/// How large the plant is, which takes as long as to make it, but no memory.
+pub fn size(params: PlantParams) -> Size {
+    let mut size = Size::default();
+    let Ok(()) = parts::<Infallible>(params, |part| {
+        size += part.size();
+        Ok(())
+    });
+    size
 }
 
 /// The plant of the demo: some 300,000 triangles.
@@ -65,8 +102,11 @@ fn quality(triangles: u64) -> f32 {
     match triangles {
         0..50_000 => 0.4,
         50_000..150_000 => 0.65,
-        150_000..1_000_000 => 1.0,
+        150_000..1_000_000 => 0.93,
         1_000_000..8_000_000 => 1.4,
         _ => 1.8,
     }
 }
+
+#[cfg(test)]
+mod tests;

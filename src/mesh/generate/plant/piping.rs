@@ -1,8 +1,10 @@
 //! Pipes with what sits on them, and the racks that carry them.
 
-use super::palette::{CABLE, CONCRETE, DARK_STEEL, GALVANISED, RED, STEEL};
-use super::steel::i_beam;
-use super::{layout::CELL_X, palette};
+use super::grating::walkway;
+use super::palette::{CONCRETE, DARK_STEEL, RED, STEEL};
+use super::plates::{shared_plate, touching_discs};
+use super::steel::{i_beam, railing};
+use super::{cables, layout::CELL_X, palette};
 use crate::mesh::generate::rng::Rng;
 use crate::mesh::generate::sketch::{Sketch, direction, rounded};
 use glam::{Vec2, Vec3};
@@ -18,10 +20,11 @@ const BOLTS_FROM: f32 = 1.2;
 
 /// A pair of flanges, in fine models with their bolts, across `axis`.
 pub(super) fn flange(sketch: &mut Sketch, at: Vec3, axis: Vec3, radius: f32) {
-    let half = axis * (radius * 0.22 + 0.015);
-    sketch.cylinder(at - half, at - half * 0.1, radius * 1.6);
-    sketch.cylinder(at + half * 0.1, at + half, radius * 1.6);
-    if sketch.quality < BOLTS_FROM {
+    let height = radius * 0.22 + 0.015;
+    let half = axis * height;
+    let fine = sketch.quality >= BOLTS_FROM;
+    touching_discs(sketch, at, axis, radius * 1.6, height, fine);
+    if !fine {
         return;
     }
     let u = axis.any_orthonormal_vector();
@@ -65,6 +68,8 @@ pub(super) fn valve(sketch: &mut Sketch, at: Vec3, axis: Vec3, radius: f32) {
 #[derive(Clone, Debug)]
 pub(super) struct Rack {
     pipes: Vec<RackPipe>,
+    /// How far down, in metres, the cables hang that are slung along its side.
+    slack: Vec<f32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -75,9 +80,11 @@ struct RackPipe {
     paint: u32,
 }
 
-/// Heights of the rack's decks, and half its width.
+/// Heights of the rack's decks and of its top beams, half its width, and the distance of its columns.
 const DECKS: [f32; 2] = [4.6, 6.8];
-const HALF_WIDTH: f32 = 3.2;
+pub(super) const RACK_TOP: f32 = DECKS[1] + 1.6;
+pub(super) const HALF_WIDTH: f32 = 3.2;
+const BAY: f32 = CELL_X / 4.0;
 
 impl Rack {
     /// The rack of a row of cells.
@@ -101,7 +108,8 @@ impl Rack {
                 z += 2.0 * radius + rng.range(0.12, 0.4);
             }
         }
-        Self { pipes }
+        let slack = (0..2 + rng.below(2)).map(|_| rng.range(0.25, 1.0)).collect();
+        Self { pipes, slack }
     }
 
     /// Draws a cell's stretch, along x around the origin. Pipes that end in a cell at the edge of
@@ -130,7 +138,16 @@ impl Rack {
                 }
             }
         }
-        self.cable_tray(sketch);
+        cables::trays(sketch);
+        for (i, sag) in self.slack.iter().enumerate() {
+            cables::slung(sketch, BAY, DECKS[1] - 0.8, -HALF_WIDTH - 0.25 - 0.09 * i as f32, *sag);
+        }
+        self.walkway(sketch);
+    }
+
+    /// Where the columns of a cell's stretch stand.
+    pub fn columns() -> [f32; 4] {
+        std::array::from_fn(|bay| BAY * (bay as f32 + 0.5) - CELL_X * 0.5)
     }
 
     /// Where a pipe from a unit may join: a pipe of the lower deck and its radius.
@@ -142,14 +159,17 @@ impl Rack {
 
     fn frame(&self, sketch: &mut Sketch) {
         let half = CELL_X * 0.5;
-        let top = DECKS[1] + 1.6;
-        for bay in 0..4 {
-            let x = -half + CELL_X * (bay as f32 + 0.5) / 4.0;
+        let top = RACK_TOP;
+        for x in Self::columns() {
             for z in [-HALF_WIDTH, HALF_WIDTH] {
                 sketch.paint = CONCRETE;
                 sketch.cuboid(Vec3::new(x - 0.35, 0.0, z - 0.35), Vec3::new(x + 0.35, 0.3, z + 0.35));
                 sketch.paint = STEEL;
                 i_beam(sketch, Vec3::new(x, 0.3, z), Vec3::new(x, top, z), 0.3, Vec3::X);
+                // Where the girders of both bays meet at the column, each brings the plate.
+                let joint = Vec3::new(x, DECKS[0] - 0.6, z + 0.16 * z.signum());
+                let half = Vec3::new(0.2, 0.2, 0.01);
+                shared_plate(sketch, joint - half, joint + half);
             }
             for y in [DECKS[0], DECKS[1], top] {
                 let end = |z: f32| Vec3::new(x, y - 0.05, z);
@@ -160,30 +180,25 @@ impl Rack {
             for y in [DECKS[0] - 0.6, DECKS[1] - 0.6, top] {
                 i_beam(sketch, Vec3::new(-half, y, z), Vec3::new(half, y, z), 0.24, Vec3::Y);
             }
-            let (x, w) = (CELL_X / 8.0, CELL_X / 4.0);
+            let x = BAY * 0.5;
             let brace = |a: f32, b: f32| (Vec3::new(a, 0.4, z), Vec3::new(b, DECKS[0] - 0.6, z));
-            for (a, b) in [brace(-x, w - x), brace(w - x, -x)] {
+            for (a, b) in [brace(-x, BAY - x), brace(BAY - x, -x)] {
                 sketch.bar(a, b, 0.12, 0.12, Vec3::Z);
             }
         }
     }
 
-    fn cable_tray(&self, sketch: &mut Sketch) {
+    /// A walkway on brackets, on the side where no pipes leave the rack.
+    fn walkway(&self, sketch: &mut Sketch) {
+        let (y, inner, outer) = (DECKS[1] - 0.1, HALF_WIDTH + 0.2, HALF_WIDTH + 1.1);
+        let end = |x: f32, z: f32| Vec3::new(x, y, z);
         let half = CELL_X * 0.5;
-        let y = DECKS[1] + 1.75;
-        for z in [-1.9, 1.4] {
-            sketch.paint = GALVANISED;
-            let plate = |s: &mut Sketch, z0: f32, z1: f32, y1: f32| {
-                s.cuboid(Vec3::new(-half, y, z0), Vec3::new(half, y1, z1));
-            };
-            plate(sketch, z, z + 0.6, y + 0.02);
-            plate(sketch, z - 0.02, z, y + 0.14);
-            plate(sketch, z + 0.6, z + 0.62, y + 0.14);
-            sketch.paint = CABLE;
-            for i in 0..6 {
-                let at = |x: f32| Vec3::new(x, y + 0.06, z + 0.08 + 0.09 * i as f32);
-                sketch.tube(&[at(-half), at(half)], 0.035);
-            }
+        walkway(sketch, end(-half, inner) - Vec3::Y * 0.04, end(half, outer));
+        sketch.paint = STEEL;
+        for x in Self::columns() {
+            let under = -Vec3::Y * 0.14;
+            i_beam(sketch, end(x, HALF_WIDTH) + under, end(x, outer) + under, 0.2, Vec3::Y);
         }
+        railing(sketch, &[end(-half, outer - 0.03), end(half, outer - 0.03)]);
     }
 }

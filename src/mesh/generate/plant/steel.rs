@@ -1,5 +1,6 @@
 //! Structural steel: beams, railings, stairs, ladders, platforms.
 
+use super::grating;
 use super::palette::{DARK_STEEL, GALVANISED, RAIL, STEEL};
 use crate::mesh::generate::sketch::{Sketch, direction};
 use glam::{Vec2, Vec3};
@@ -54,7 +55,7 @@ pub(super) fn stairs(sketch: &mut Sketch, from: Vec3, to: Vec3, width: f32) {
     sketch.paint = GALVANISED;
     for i in 1..=steps as usize {
         let tread = from.lerp(to, (i as f32 - 0.5) / steps);
-        sketch.bar(tread - across, tread + across, 0.26, 0.04, Vec3::Y);
+        grating::tread(sketch, tread, across, 0.26, 0.04);
     }
     for side in [across, -across] {
         sketch.paint = STEEL;
@@ -108,8 +109,7 @@ pub(super) fn ring_platform(sketch: &mut Sketch, center: Vec3, inner: f32, width
 
 /// A rectangular floor of grating on edge beams.
 pub(super) fn floor(sketch: &mut Sketch, min: Vec3, max: Vec3) {
-    sketch.paint = GALVANISED;
-    sketch.cuboid(min, Vec3::new(max.x, min.y + 0.06, max.z));
+    grating::floor(sketch, min, Vec3::new(max.x, min.y + 0.06, max.z));
     sketch.paint = STEEL;
     let at = |x: f32, z: f32| Vec3::new(x, min.y - 0.15, z);
     let joists = ((max.x - min.x) / 1.5) as usize;

@@ -1,7 +1,8 @@
 //! Fired heaters with their chimneys.
 
 use super::Site;
-use crate::mesh::generate::plant::palette::{BRICK, CREAM, DARK_STEEL, GALVANISED, ORANGE, SILVER, STEEL};
+use crate::mesh::generate::plant::grating::walkway;
+use crate::mesh::generate::plant::palette::{BRICK, CREAM, DARK_STEEL, ORANGE, SILVER, STEEL};
 use crate::mesh::generate::plant::piping::pipe;
 use crate::mesh::generate::plant::steel::{i_beam, ladder, railing};
 use crate::mesh::generate::plant::vessels::chimney;
@@ -34,8 +35,7 @@ impl Site<'_> {
         let height = self.rng.range(38.0, 52.0);
         chimney(self.sketch, stack, 2.0, height);
         for y in [6.4, 9.7] {
-            self.sketch.paint = GALVANISED;
-            self.sketch.cuboid(Vec3::new(min.x, y, max.z), Vec3::new(max.x, y + 0.06, max.z + 1.4));
+            walkway(self.sketch, Vec3::new(min.x, y, max.z), Vec3::new(max.x, y + 0.06, max.z + 1.4));
             let at = |x: f32, dz: f32| Vec3::new(x, y + 0.06, max.z + dz);
             railing(self.sketch, &[at(min.x, 0.0), at(min.x, 1.4), at(max.x, 1.4), at(max.x, 0.0)]);
         }

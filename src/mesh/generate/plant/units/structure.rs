@@ -1,8 +1,9 @@
 //! Steel structures: floors full of equipment, with stairs beside them.
 
 use super::Site;
+use crate::mesh::generate::plant::grating::walkway;
 use crate::mesh::generate::plant::palette::{
-    BLUE, CONCRETE, CREAM, DARK_STEEL, GALVANISED, GREEN, ORANGE, RED, SILVER, STEEL, WHITE,
+    BLUE, CONCRETE, CREAM, DARK_STEEL, GREEN, ORANGE, RED, SILVER, STEEL, WHITE,
 };
 use crate::mesh::generate::plant::piping::{pipe, valve};
 use crate::mesh::generate::plant::steel::{floor, i_beam, ladder, railing, stairs};
@@ -70,10 +71,10 @@ impl Site<'_> {
         let (low, high) = if back { (-1.6, -6.6) } else { (-6.6, -1.6) };
         let x = if back { 2.2 } else { 0.9 };
         stairs(self.sketch, at + Vec3::new(x, 0.0, low), at + Vec3::new(x, storey, high), 0.9);
-        self.sketch.paint = GALVANISED;
         let (near, far) = if back { (-8.2, high) } else { (high, 0.0) };
         let landing = at + Vec3::Y * storey;
-        self.sketch.cuboid(
+        walkway(
+            self.sketch,
             landing + Vec3::new(0.2, -0.06, near.min(far)),
             landing + Vec3::new(2.8, 0.0, near.max(far)),
         );
