@@ -64,7 +64,7 @@ fn a_search_writes_a_profile_that_render_takes() {
     let plot = fs::read_to_string(place.path("p.svg")).expect("written");
     assert!(plot.starts_with("<svg") && plot.contains("What settings are worth"), "a plot");
     place.raypack("render plant.ply --profile mine.toml -o a.png --size 32x32").assert().success();
-    let loaded = raypack::Profile::read(place.path("mine.toml")).expect("a profile");
+    let loaded = raypack::profile::Profile::read(place.path("mine.toml")).expect("a profile");
     assert_eq!(loaded.tuned.expect("what was measured").steps.len(), measured.len());
 }
 
@@ -91,7 +91,7 @@ fn an_interrupted_search_writes_the_best_so_far() {
     };
     assert!(status.success(), "{status}");
     assert_eq!(place.json("r.json")["interrupted"], true);
-    raypack::Profile::read(place.path("mine.toml")).expect("a profile");
+    raypack::profile::Profile::read(place.path("mine.toml")).expect("a profile");
 }
 
 #[test]
