@@ -16,7 +16,12 @@ use std::time::Instant;
 /// Rays that a thread takes at a time.
 const CHUNK: usize = 4096;
 
-/// Pairs of runs after which a comparison may end early, and after which it ends.
+/// Runs of one measurement, and the seconds that it lasts unless its runs are long.
+const LEAST_RUNS: usize = 2;
+const MOST_RUNS: usize = 20;
+const RUN_SECONDS: f64 = 0.08;
+
+/// Pairs of measurements after which a comparison may end early, and after which it ends.
 const LEAST_PAIRS: usize = 3;
 const MOST_PAIRS: usize = 9;
 
@@ -103,7 +108,8 @@ impl<'a> Track<'a> {
         Ok(track)
     }
 
-    /// The seconds that each load of each view takes.
+    /// The seconds that each load of each view takes: the least of some runs, since what else the machine
+    /// does only ever adds to them.
     fn seconds(&self, candidate: &Candidate) -> Result<Vec<f64>> {
         let mut seconds = Vec::new();
         for view in &self.views {
@@ -111,10 +117,10 @@ impl<'a> Track<'a> {
                 let mut settings = RenderSettings::new(self.options.size);
                 settings.tuning = candidate.profile.render.clone();
                 let renderer = Renderer::new(&candidate.accel, self.mesh, settings)?;
-                seconds.push(renderer.frame(&view.camera, &view.lighting).1.seconds);
+                seconds.push(least(|| renderer.frame(&view.camera, &view.lighting).1.seconds));
             }
             for (kind, rays) in &view.rays {
-                seconds.push(trace(candidate, *kind, rays));
+                seconds.push(least(|| trace(candidate, *kind, rays)));
             }
         }
         Ok(seconds)
@@ -162,6 +168,18 @@ impl<'a> Track<'a> {
         }
         Ok((ratios.len() >= LEAST_PAIRS).then(|| Comparison::of(&ratios)))
     }
+}
+
+/// The least of some runs: of at least [`LEAST_RUNS`], and of as many as [`RUN_SECONDS`] hold.
+fn least(run: impl Fn() -> f64) -> f64 {
+    let start = Instant::now();
+    let mut least = f64::INFINITY;
+    let mut runs = 0;
+    while runs < LEAST_RUNS || runs < MOST_RUNS && start.elapsed().as_secs_f64() < RUN_SECONDS {
+        least = least.min(run());
+        runs += 1;
+    }
+    least
 }
 
 /// Traces rays with all threads; the seconds that it took.
