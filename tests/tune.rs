@@ -50,8 +50,13 @@ fn a_search_writes_a_profile_that_render_takes() {
         assert!(candidate["pairs"].as_u64() >= Some(3), "{candidate}");
         assert!(candidate["predicted"].as_f64().expect("a ratio") > 0.0, "{candidate}");
     }
-    // What was taken is what the best has.
+    // What was taken is what the best has, unless it was luck.
+    let kept = report["kept"] == true;
     for value in report["values"].as_array().expect("a list") {
+        if !kept {
+            assert_eq!(value["start"], value["best"], "{value}");
+            continue;
+        }
         let taken = |m: &&Value| m["setting"] == value["setting"] && m["accepted"] == true;
         let last = measured.iter().rfind(taken).map_or(&value["start"], |m| &m["value"]);
         assert_eq!(last, &value["best"], "{value}");

@@ -2,10 +2,11 @@
 //!
 //! From a profile on, one setting at a time is moved along its ladder of values for as long as that helps
 //! ([`search`]). Each candidate is run against the best so far in turn, A B B A, at least three times, and
-//! takes its place only if the middle pair and two thirds of all say that it is quicker: machines are noisy,
+//! takes its place only if the middle pair and three quarters of all say that it is quicker: machines are noisy,
 //! and a search that believes every measurement ends with what was measured luckily. What time is left shows
 //! what each setting is worth around the best: that is the report's plot. At the end the best is run against
-//! the start once more, since a chain of small gains adds up its luck as well.
+//! the start once more, since a chain of small gains adds up its luck as well; if it is no quicker then, the start
+//! stays.
 
 mod report;
 mod search;
@@ -270,7 +271,10 @@ impl Tuner<'_> {
         } else {
             self.track.compare(&first, &self.best, &|| self.stop.load(Ordering::Relaxed))?
         };
+        let kept = compared.is_none_or(|compared| compared.ratio < 1.0);
+        let (best, candidate) = if kept { (best, &self.best) } else { (&self.start, &first) };
         Ok(Report {
+            kept,
             model: model.into(),
             triangles: self.mesh.triangles.len(),
             cameras: self.options.cameras.iter().map(Camera::to_string).collect(),
@@ -297,8 +301,8 @@ impl Tuner<'_> {
                     best: setting.value(best),
                 })
                 .collect(),
-            build_seconds: [first.build_seconds, self.best.build_seconds],
-            bytes_per_triangle: [first.stats.bytes_per_triangle, self.best.stats.bytes_per_triangle],
+            build_seconds: [first.build_seconds, candidate.build_seconds],
+            bytes_per_triangle: [first.stats.bytes_per_triangle, candidate.stats.bytes_per_triangle],
             measured: self.measured,
             profile: best.clone(),
         })

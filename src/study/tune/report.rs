@@ -91,6 +91,9 @@ pub struct Report {
     pub seconds: f64,
     /// Whether somebody stopped it.
     pub interrupted: bool,
+    /// Whether the best was no slower than the start when they were run against one another in the end;
+    /// otherwise what was found was luck, and the start is given out as the best.
+    pub kept: bool,
     /// What the best takes beside the start, run against it in the end: least, middle and greatest of the
     /// pairs. `None` if the start is the best, or there was no time.
     pub time: Option<[f64; 3]>,
@@ -178,6 +181,13 @@ impl fmt::Display for Report {
         let [before, after] = self.bytes_per_triangle;
         writeln!(f, "{:22} {before:>8.1} {after:>8.1}", "tree, B a triangle")?;
         match self.time {
+            Some([low, time, high]) if !self.kept => {
+                writeln!(
+                    f,
+                    "\nwhat was found was luck: run against the start once more, it took {time:.3} of its time \
+                     ({low:.3} to {high:.3}); the start stays"
+                )?;
+            }
             Some([low, time, high]) => {
                 writeln!(f, "\nthe best takes {time:.3} of the start's time ({low:.3} to {high:.3})")?;
             }

@@ -29,8 +29,9 @@ const MOST_PAIRS: usize = 9;
 const CLEARLY_WORSE: f64 = 1.04;
 /// ... better for certain if every pair says so and the middle one by this much, ...
 const CLEARLY_BETTER: f64 = 0.96;
-/// ... and counts as better in the end if the middle pair says so by this much.
-const BETTER: f64 = 0.99;
+/// ... and counts as better in the end if the middle one of so many pairs says so by this much.
+const BETTER: f64 = 0.98;
+const PAIRS_TO_WIN: usize = 5;
 
 /// A profile with its tree.
 pub struct Candidate {
@@ -227,12 +228,13 @@ impl Comparison {
 
     /// Whether more pairs are not needed.
     fn is_clear(&self) -> bool {
-        self.low > 1.0 && self.ratio > CLEARLY_WORSE || self.high < 1.0 && self.ratio < CLEARLY_BETTER
+        let better = self.pairs >= PAIRS_TO_WIN && self.high < 1.0 && self.ratio < CLEARLY_BETTER;
+        better || self.low > 1.0 && self.ratio > CLEARLY_WORSE
     }
 
-    /// Whether the candidate is better, beyond what noise explains: by the middle pair, and in two of three.
+    /// Whether the candidate is better, beyond what noise explains: by the middle pair, and in three of four.
     pub fn is_better(&self) -> bool {
-        self.ratio < BETTER && 3 * self.better >= 2 * self.pairs
+        self.pairs >= PAIRS_TO_WIN && self.ratio < BETTER && 4 * self.better >= 3 * self.pairs
     }
 }
 
@@ -242,12 +244,14 @@ mod tests {
 
     #[test]
     fn noise_is_not_taken_for_a_gain() {
-        assert!(Comparison::of(&[0.9, 0.93, 0.95]).is_better());
-        assert!(Comparison::of(&[0.9, 0.93, 0.95]).is_clear());
+        let all = [0.9, 0.91, 0.93, 0.94, 0.95];
+        assert!(Comparison::of(&all).is_better() && Comparison::of(&all).is_clear());
+        // Three pairs may be luck.
+        assert!(!Comparison::of(&all[..3]).is_better() && !Comparison::of(&all[..3]).is_clear());
         // Two pairs of five were worse.
         assert!(!Comparison::of(&[0.8, 0.97, 0.98, 1.01, 1.2]).is_better());
         assert!(!Comparison::of(&[0.8, 0.97, 0.98, 1.01, 1.2]).is_clear());
-        assert!(!Comparison::of(&[0.992, 0.995, 0.996]).is_better());
+        assert!(!Comparison::of(&[0.98, 0.985, 0.985, 0.99, 0.99]).is_better());
         assert!(
             Comparison::of(&[1.02, 1.05, 1.3]).is_clear() && !Comparison::of(&[1.02, 1.05, 1.3]).is_better()
         );
