@@ -1,7 +1,7 @@
 //! The search for the settings that suit a model and a machine.
 //!
 //! From a profile on, one setting at a time is moved along its ladder of values for as long as that helps
-//! ([`search`]). Each candidate is run against the best so far in turn, A B B A, at least three times, and
+//! (coordinate descent). Each candidate is run against the best so far in turn, A B B A, at least three times, and
 //! takes its place only if the middle pair and three quarters of all say that it is quicker: machines are noisy,
 //! and a search that believes every measurement ends with what was measured luckily. What time is left shows
 //! what each setting is worth around the best: that is the report's plot. At the end the best is run against
