@@ -66,7 +66,7 @@ const WAIT: f32 = 80.0;
 const KNOWN_WELL: f32 = 16.0;
 
 /// The greatest number: what was true of the places before may be false of those to come.
-const MOST_WAIT: f32 = 400.0;
+const MOST_WAIT: f32 = 800.0;
 
 /// The number of lots after a trial that did better than the quickest way is known to.
 const WAIT_AFTER_SURPRISE: f32 = 4.0;
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn the_slower_way_costs_little_however_slow() {
         for cost in [[30.0, 36.0], [36.0, 30.0], [30.0, 90.0], [300.0, 30.0], [30.0, 30.0]] {
-            let (taken, ratio) = run(&mut Choice::default(), 8000, |_| cost);
+            let (taken, ratio) = run(&mut Choice::default(), 4000, |_| cost);
             assert!(taken[0] > 0 && taken[1] > 0);
             assert!(ratio < 1.03, "{cost:?}: {ratio}");
         }
@@ -231,8 +231,8 @@ mod tests {
     fn a_change_is_noticed() {
         let mut choice = Choice::default();
         run(&mut choice, 500, |_| [30.0, 45.0]);
-        let (taken, _) = run(&mut choice, 2000, |_| [60.0, 45.0]);
-        assert!(taken[1] > 1500, "{taken:?}");
+        let (taken, _) = run(&mut choice, 500, |_| [60.0, 45.0]);
+        assert!(taken[1] > 400, "{taken:?}");
     }
 
     #[test]
@@ -240,8 +240,8 @@ mod tests {
         let mut choice = Choice::default();
         run(&mut choice, 100, |_| [30.0, 45.0]);
         choice.record(0, 256, Duration::from_millis(100));
-        let (taken, _) = run(&mut choice, 200, |_| [30.0, 45.0]);
-        assert!(taken[0] > 150, "{taken:?}");
+        let (taken, _) = run(&mut choice, 100, |_| [30.0, 45.0]);
+        assert!(taken[0] > 60, "{taken:?}");
     }
 
     #[test]
