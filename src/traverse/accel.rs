@@ -3,6 +3,7 @@
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::query::{CountTile, InMode, IntersectPacket, IntersectTile, OccludedPacket, OccludedTile, Query};
+use super::records::Resident;
 use super::tile::{PACKETS, TileCounts};
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
@@ -111,13 +112,14 @@ impl Accel {
     #[inline(always)]
     fn ask<Q: Query>(&self, query: Q) -> Q::Output {
         let tree = &*self.tree;
-        let triangles = tree.triangles();
+        let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
-            Accuracy::Fast => self.chosen.run(InMode::<_, Fast> { query, tree, records: &self.projected }),
-            Accuracy::Watertight => {
-                self.chosen.run(InMode::<_, Watertight> { query, tree, records: triangles })
+            Accuracy::Fast => {
+                let projected = Resident { tree, records: &*self.projected };
+                self.chosen.run(InMode::<_, Fast, _>::new(query, &projected))
             }
-            Accuracy::Exact => self.chosen.run(InMode::<_, Exact> { query, tree, records: triangles }),
+            Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles)),
+            Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &triangles)),
         }
     }
 
@@ -189,8 +191,8 @@ impl Accel {
     /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
         let query = CountTile { rays, active: &tile_lanes(rays, active), any_hit, counts: &mut *counts };
-        let (tree, records) = (&*self.tree, self.tree.triangles());
-        let done = self.chosen.run(InMode::<_, Watertight> { query, tree, records });
+        let triangles = Resident { tree: &self.tree, records: self.tree.triangles() };
+        let done = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
         counts.beams += u64::from(done);
     }
 

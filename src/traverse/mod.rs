@@ -17,6 +17,7 @@ mod lanes;
 mod packet;
 mod query;
 mod range;
+mod records;
 mod stack;
 mod stream;
 mod tile;
