@@ -58,6 +58,7 @@
 //! Every kernel on every instruction set gives the same answer, to the bit.
 
 pub mod batch;
+pub mod cache;
 pub mod error;
 pub mod files;
 pub mod geometry;

@@ -126,7 +126,7 @@ pub fn run(args: &Args) -> Result<()> {
     let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
     watch("rendering", fraction, || {
         for (number, camera) in (0..).zip(cameras) {
-            let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done);
+            let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
             let file = args.outputs.write(&frame, number, args.orbit)?;
             debug!("frame {number} in {:.4} s", stats.seconds);
             shots.push(Shot { file, camera, stats });

@@ -27,7 +27,6 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
-use glam::Vec3;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
 
@@ -135,8 +134,7 @@ impl KdTree {
 
     /// The box around all triangles, in the mesh's coordinates.
     pub fn mesh_bounds(&self) -> Aabb {
-        let [min, max, _] = self.scale.undo(&[self.bounds.min, self.bounds.max, Vec3::ZERO].map(Vec3::into));
-        Aabb { min: min.into(), max: max.into() }
+        self.scale.undo_bounds(&self.bounds)
     }
 
     /// The tree in cache lines; the root is the first.

@@ -2,7 +2,7 @@
 
 use super::frame::{Frame, TilePixels, TiledFrame};
 use super::order::{Tile, tiles};
-use super::scheduler::{Outcome, Workers};
+use super::scheduler::{Outcome, Sharing, Workers};
 use super::settings::RenderSettings;
 use super::shade::Shader;
 use super::stats::{FrameStats, RayCount, Tally};
@@ -24,6 +24,8 @@ pub struct Renderer<'a> {
     tiles: Vec<Tile>,
     /// What workers learnt in the frame before about which kernel is quickest.
     learnt: Mutex<Vec<Dispatch>>,
+    /// Frames so far.
+    frames: AtomicUsize,
 }
 
 impl<'a> Renderer<'a> {
@@ -34,7 +36,7 @@ impl<'a> Renderer<'a> {
     pub fn new(accel: &'a Accel, mesh: &'a Mesh, settings: RenderSettings) -> Result<Self> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
-        Ok(Self { accel, mesh, settings, tiles, learnt: Mutex::default() })
+        Ok(Self { accel, mesh, settings, tiles, learnt: Mutex::default(), frames: AtomicUsize::new(0) })
     }
 
     /// The settings.
@@ -47,13 +49,29 @@ impl<'a> Renderer<'a> {
         self.tiles.len()
     }
 
-    /// Renders a frame.
+    /// Renders a frame. Panics if a scene that is not all in memory cannot be read.
     pub fn frame(&self, camera: &Camera, lighting: &Lighting) -> (Frame, FrameStats) {
-        self.frame_with_progress(camera, lighting, &AtomicUsize::new(0))
+        self.frame_with_progress(camera, lighting, &AtomicUsize::new(0)).expect("the scene can be read")
     }
 
     /// Renders a frame; `tiles_done` is raised by one with each tile and can be read meanwhile.
+    ///
+    /// # Errors
+    /// A scene that is not all in memory cannot be read.
     pub fn frame_with_progress(
+        &self,
+        camera: &Camera,
+        lighting: &Lighting,
+        tiles_done: &AtomicUsize,
+    ) -> Result<(Frame, FrameStats)> {
+        let frame = || self.frame_by_kernel(camera, lighting, tiles_done);
+        match self.accel.cached() {
+            Some(cached) => cached.or_error(frame),
+            None => Ok(frame()),
+        }
+    }
+
+    fn frame_by_kernel(
         &self,
         camera: &Camera,
         lighting: &Lighting,
@@ -81,7 +99,13 @@ impl<'a> Renderer<'a> {
     {
         let start = Instant::now();
         let RenderSettings { size, samples, shadows, aovs, ref tuning } = self.settings;
-        let workers = Workers { threads: tuning.worker_count(), pin: tuning.pin };
+        let threads = tuning.worker_count();
+        let workers = match self.accel.cached() {
+            None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
+            // Some wait for their blocks while others are at work. Tiles that are begun at about the same
+            // time are neighbours, so that they need the same blocks.
+            Some(cached) => Workers { threads: cached.workers(threads), pin: false, sharing: Sharing::Queue },
+        };
         let task = TileTask {
             accel: self.accel,
             calls,
@@ -91,8 +115,13 @@ impl<'a> Renderer<'a> {
         };
 
         let mut tiled = TiledFrame::new(size, aovs);
+        let mut jobs = tiled.split(&self.tiles);
+        // What the last frame has used last is there still: this one begins with it.
+        if self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some() {
+            jobs.reverse();
+        }
         let outcome = workers.run(
-            tiled.split(&self.tiles),
+            jobs,
             || {
                 let learnt = self.learnt.lock().unwrap_or_else(PoisonError::into_inner).pop();
                 Scratch::<W>::new(learnt.unwrap_or_default())
@@ -105,11 +134,15 @@ impl<'a> Renderer<'a> {
         *self.learnt.lock().unwrap_or_else(PoisonError::into_inner) =
             outcome.states.iter().map(|scratch| scratch.dispatch).collect();
         let frame = tiled.assemble(size, &self.tiles);
-        (frame, self.stats(&outcome, start.elapsed().as_secs_f64()))
+        (frame, self.stats(&outcome, threads, start.elapsed().as_secs_f64()))
     }
 
-    fn stats<const W: usize>(&self, outcome: &Outcome<Scratch<W>>, seconds: f64) -> FrameStats {
-        let threads = outcome.states.len();
+    fn stats<const W: usize>(
+        &self,
+        outcome: &Outcome<Scratch<W>>,
+        threads: usize,
+        seconds: f64,
+    ) -> FrameStats {
         let camera: Tally = outcome.states.iter().map(|scratch| scratch.camera).sum();
         let shadow: Tally = outcome.states.iter().map(|scratch| scratch.shadow).sum();
         FrameStats {

@@ -19,6 +19,7 @@ mod query;
 mod range;
 mod records;
 mod stack;
+mod stopwatch;
 mod stream;
 mod tile;
 mod walk;
@@ -27,6 +28,7 @@ pub use accel::Accel;
 pub use dispatch::Dispatch;
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, PacketWidth, RayPacket};
+pub use stopwatch::Stopwatch;
 pub use tile::TileCounts;
 
 #[cfg(test)]

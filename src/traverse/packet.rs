@@ -74,7 +74,6 @@ fn walk<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: bool>(
 }
 
 /// Walks the subtree under `node`, in which the lanes are in `interval`. Some lane must be live.
-#[expect(clippy::too_many_arguments, reason = "it is one half of a function in two kernels")]
 #[inline(always)]
 pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: bool>(
     tree: &T,

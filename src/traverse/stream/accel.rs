@@ -19,11 +19,11 @@ impl Accel {
     }
 
     fn stream<A: Answers>(&self, rays: &[Ray], answers: A) {
-        let tree = &*self.tree;
+        let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
             Accuracy::Fast => {
-                let tree = Resident { tree, records: &*self.projected };
+                let tree = Resident { tree, records: &self.projected };
                 self.chosen.run(Stream::<Fast, A> { tree, rays, answers });
             }
             Accuracy::Watertight => {
