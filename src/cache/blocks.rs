@@ -25,6 +25,9 @@ use std::time::{Duration, Instant};
 /// The most threads that may read at a time.
 const READERS: usize = 4096;
 
+/// What lengths of reads are multiples of: what checksums are for.
+const READ: usize = 4096;
+
 /// Requests that wait for a loader.
 const QUEUE: usize = 256;
 
@@ -237,11 +240,13 @@ impl Blocks {
         let (array, byte, bytes) = self.layout.locate(block);
         // SAFETY: readers look only at what is here; the block is not, its last memory has been freed, and
         // the directory tells one thread alone to load it.
-        let into = unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes) };
+        let into = unsafe {
+            self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ))
+        };
         let read = if self.has_failed() {
             Ok(false)
         } else {
-            self.source.read(array as usize, byte, into).map(|()| true)
+            self.source.read(array, byte, into).map(|()| true)
         };
         match read {
             Ok(true) => {
