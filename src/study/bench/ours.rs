@@ -11,8 +11,8 @@ use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
-use std::sync::{Mutex, PoisonError};
+use crate::traverse::{Accel, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// raypack with its tree built.
@@ -104,27 +104,21 @@ impl Ours {
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
     /// chunk, and taken up by whoever comes next: mostly the same worker.
     fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
-        let learnt = std::sync::Arc::new(Mutex::new(Vec::<Dispatch>::new()));
-        let take = |learnt: &Mutex<Vec<Dispatch>>| {
-            learnt.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
-        };
-        let put = |learnt: &Mutex<Vec<Dispatch>>, dispatch| {
-            learnt.lock().unwrap_or_else(PoisonError::into_inner).push(dispatch);
-        };
-        let shared = learnt.clone();
+        let learnt = Arc::new(DispatchPool::default());
+        let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
-            let mut dispatch = take(&shared);
+            let mut dispatch = shared.take();
             for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
                 dispatch.intersect(accel, packets, lanes, out);
             }
-            put(&shared, dispatch);
+            shared.put(dispatch);
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
-            let mut dispatch = take(&learnt);
+            let mut dispatch = learnt.take();
             for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
                 dispatch.occluded(accel, packets, lanes, out);
             }
-            put(&learnt, dispatch);
+            learnt.put(dispatch);
         };
         let lots = Packets::lots(rays, any_hit);
         Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any })
