@@ -7,7 +7,7 @@ use super::engine::{Contender, Engine, Lot, Results, collect};
 use super::report::Beams;
 use crate::error::Result;
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::kdtree::BuildParams;
+use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
@@ -20,7 +20,7 @@ use std::time::Instant;
 pub struct Ours {
     accel: Accel,
     build_seconds: f64,
-    bytes: u64,
+    stats: TreeStats,
 }
 
 impl Ours {
@@ -37,13 +37,23 @@ impl Ours {
 
     /// The same with a tree that has been built, in so many seconds.
     pub fn of_accel(accel: Accel, build_seconds: f64) -> Self {
-        let bytes = (accel.stats().bytes() + accel.record_bytes()) as u64;
-        Self { accel, build_seconds, bytes }
+        let stats = accel.stats();
+        Self { accel, build_seconds, stats }
     }
 
     /// Seconds that the build took.
     pub fn build_seconds(&self) -> f64 {
         self.build_seconds
+    }
+
+    /// Figures about the tree.
+    pub fn stats(&self) -> &TreeStats {
+        &self.stats
+    }
+
+    /// Bytes of the tree with its triangles.
+    pub fn bytes(&self) -> u64 {
+        (self.stats.bytes() + self.accel.record_bytes()) as u64
     }
 
     /// The built tree.
@@ -179,7 +189,7 @@ impl Contender for SliceRun<'_> {
     }
 
     fn bytes(&self) -> u64 {
-        self.engine.bytes
+        self.engine.bytes()
     }
 
     fn trace(&self, chunk: usize) {
@@ -254,7 +264,7 @@ where
     }
 
     fn bytes(&self) -> u64 {
-        self.engine.bytes
+        self.engine.bytes()
     }
 
     fn trace(&self, chunk: usize) {
