@@ -240,14 +240,10 @@ impl Blocks {
         let (array, byte, bytes) = self.layout.locate(block);
         // SAFETY: readers look only at what is here; the block is not, its last memory has been freed, and
         // the directory tells one thread alone to load it.
-        let into = unsafe {
-            self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ))
-        };
-        let read = if self.has_failed() {
-            Ok(false)
-        } else {
-            self.source.read(array, byte, into).map(|()| true)
-        };
+        let into =
+            unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ)) };
+        let read =
+            if self.has_failed() { Ok(false) } else { self.source.read(array, byte, into).map(|()| true) };
         match read {
             Ok(true) => {
                 add(&self.counters.loads, 1);

@@ -81,16 +81,17 @@ pub fn run(args: &Args) -> Result<()> {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
         scene.accel.tree().validate().map_err(fault)?;
     }
+    let duplication = scene.accel.tree().duplication();
     let report = Report {
         engine: ENGINE,
-        scene: scene.report(),
+        scene: scene.report().with_duplication(&duplication),
         colors: colors(&scene.model.mesh),
         memory: memory(&scene.model.mesh, &scene.tree),
         shapes: Shapes::of(&scene.model.mesh),
         random_rays: random_rays(&scene),
         validated: args.validate,
     };
-    args.json.give(&text(&scene, &report), &report)
+    args.json.give(&text(&scene, &report, &duplication), &report)
 }
 
 /// Random rays are as many as a square image of this side has pixels.
@@ -141,7 +142,7 @@ fn memory(mesh: &Mesh, tree: &TreeStats) -> Memory {
     memory
 }
 
-fn text(scene: &Scene, report: &Report<'_>) -> String {
+fn text(scene: &Scene, report: &Report<'_>, duplication: &[usize]) -> String {
     let mut lines = Lines::default();
     scene.describe(&mut lines);
     let tree = &scene.tree;
@@ -173,7 +174,7 @@ fn text(scene: &Scene, report: &Report<'_>) -> String {
     let numbered = |first: usize| move |i: usize| (i + first).to_string();
     bars(&mut lines, "leaf size", "leaves", &tree.leaf_histogram, numbered(0));
     bars(&mut lines, "depth", "leaves", &tree.depth_histogram, numbered(0));
-    bars(&mut lines, "in leaves", "triangles", &tree.duplication_histogram, numbered(1));
+    bars(&mut lines, "in leaves", "triangles", duplication, numbered(1));
     let shapes = &report.shapes;
     let [by_area, by_aspect] =
         [shapes.by_area, shapes.by_aspect].map(|counts| counts.map(|count| count as usize));

@@ -111,7 +111,25 @@ pub struct SceneReport<'a> {
     read_report: Option<&'a ReadReport>,
     build_seconds: f64,
     build_memory: BuildMemory,
-    tree: &'a TreeStats,
+    tree: TreeReport<'a>,
+}
+
+/// The figures about a tree.
+#[derive(Debug, Serialize)]
+struct TreeReport<'a> {
+    #[serde(flatten)]
+    stats: &'a TreeStats,
+    /// [`KdTree::duplication`](crate::kdtree::KdTree::duplication), where it was counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    duplication_histogram: Option<&'a [usize]>,
+}
+
+impl<'a> SceneReport<'a> {
+    /// The same with how many leaves triangles are in.
+    pub fn with_duplication(mut self, histogram: &'a [usize]) -> Self {
+        self.tree.duplication_histogram = Some(histogram);
+        self
+    }
 }
 
 impl Scene {
@@ -127,7 +145,7 @@ impl Scene {
             read_report: report.as_ref(),
             build_seconds: self.build_seconds,
             build_memory: self.memory,
-            tree: &self.tree,
+            tree: TreeReport { stats: &self.tree, duplication_histogram: None },
         }
     }
 

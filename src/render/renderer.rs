@@ -10,9 +10,8 @@ use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::scene::{Camera, Lighting};
-use crate::traverse::{Accel, Dispatch, Kernel, PacketWidth, RayPacket};
+use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Makes pictures of one scene with one set of settings.
@@ -22,8 +21,8 @@ pub struct Renderer<'a> {
     mesh: &'a Mesh,
     settings: RenderSettings,
     tiles: Vec<Tile>,
-    /// What workers learnt in the frame before about which kernel is quickest.
-    learnt: Mutex<Vec<Dispatch>>,
+    /// What workers learnt in the frames before about which kernel is quickest.
+    learnt: DispatchPool,
     /// Frames so far.
     frames: AtomicUsize,
 }
@@ -36,7 +35,8 @@ impl<'a> Renderer<'a> {
     pub fn new(accel: &'a Accel, mesh: &'a Mesh, settings: RenderSettings) -> Result<Self> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
-        Ok(Self { accel, mesh, settings, tiles, learnt: Mutex::default(), frames: AtomicUsize::new(0) })
+        let learnt = DispatchPool::default();
+        Ok(Self { accel, mesh, settings, tiles, learnt, frames: AtomicUsize::new(0) })
     }
 
     /// The settings.
@@ -122,17 +122,13 @@ impl<'a> Renderer<'a> {
         }
         let outcome = workers.run(
             jobs,
-            || {
-                let learnt = self.learnt.lock().unwrap_or_else(PoisonError::into_inner).pop();
-                Scratch::<W>::new(learnt.unwrap_or_default())
-            },
+            || Scratch::<W>::new(self.learnt.take()),
             |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
                 task.render(scratch, pixels);
                 tiles_done.fetch_add(1, Ordering::Relaxed);
             },
         );
-        *self.learnt.lock().unwrap_or_else(PoisonError::into_inner) =
-            outcome.states.iter().map(|scratch| scratch.dispatch).collect();
+        outcome.states.iter().for_each(|scratch| self.learnt.put(scratch.dispatch));
         let frame = tiled.assemble(size, &self.tiles);
         (frame, self.stats(&outcome, threads, start.elapsed().as_secs_f64()))
     }

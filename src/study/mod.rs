@@ -8,6 +8,8 @@ pub mod bench;
 pub mod heat;
 #[cfg(feature = "peers")]
 pub mod peers;
+#[cfg(feature = "accuracy")]
+pub mod plot;
 pub mod rays;
 pub mod reference;
 pub mod resident;

@@ -25,7 +25,7 @@ mod tile;
 mod walk;
 
 pub use accel::Accel;
-pub use dispatch::Dispatch;
+pub use dispatch::{Dispatch, DispatchPool};
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, PacketWidth, RayPacket};
 pub use stopwatch::Stopwatch;

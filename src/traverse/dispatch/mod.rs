@@ -8,6 +8,9 @@
 //! on the choice: hits are the same, bit for bit.
 
 mod choice;
+mod pool;
+
+pub use pool::DispatchPool;
 
 use super::accel::Accel;
 use super::kernel::Kernel;
