@@ -5,7 +5,7 @@ use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
 use super::settings::RenderSettings;
 use super::shade::Shader;
-use super::stats::{FrameStats, RayCount, Tally};
+use super::stats::{FrameStats, RayCount, Tally, quantile};
 use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
@@ -141,12 +141,16 @@ impl<'a> Renderer<'a> {
     ) -> FrameStats {
         let camera: Tally = outcome.states.iter().map(|scratch| scratch.camera).sum();
         let shadow: Tally = outcome.states.iter().map(|scratch| scratch.shadow).sum();
+        let mut times: Vec<f32> =
+            outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied()).collect();
         FrameStats {
             camera: RayCount::new(camera, threads),
             shadow: RayCount::new(shadow, threads),
             total: RayCount::of(camera.rays + shadow.rays, seconds),
             seconds,
             tiles: self.tiles.len(),
+            tile_p50: quantile(&mut times, 0.5),
+            tile_p99: quantile(&mut times, 0.99),
             threads,
             pinned: outcome.pinned,
         }

@@ -9,6 +9,7 @@ use crate::geometry::{Hit, Ray};
 use crate::scene::View;
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
 use glam::Vec3;
+use std::time::Instant;
 
 /// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
 /// that reading the clock between stages costs nothing, few enough that their rays and hits stay in the
@@ -120,6 +121,8 @@ pub(super) struct Scratch<const W: usize> {
     pub dispatch: Dispatch,
     pub camera: Tally,
     pub shadow: Tally,
+    /// Seconds that each tile took, waiting included.
+    pub tiles: Vec<f32>,
 }
 
 impl<const W: usize> Scratch<W> {
@@ -138,6 +141,7 @@ impl<const W: usize> Scratch<W> {
             dispatch,
             camera: Tally::default(),
             shadow: Tally::default(),
+            tiles: Vec::new(),
         }
     }
 }
@@ -176,6 +180,7 @@ where
 {
     /// Renders a tile into its pixels.
     pub fn render(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>) {
+        let start = Instant::now();
         let mut pixels = pixels;
         let tile = pixels.tile;
         for y in (0..tile.height).step_by(SQUARE as usize) {
@@ -189,6 +194,7 @@ where
                 self.write(scratch, used, &mut pixels);
             }
         }
+        scratch.tiles.push(start.elapsed().as_secs_f32());
     }
 
     /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
