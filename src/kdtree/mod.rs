@@ -9,6 +9,7 @@ mod memory;
 mod node;
 mod pages;
 mod params;
+mod parts;
 mod preset;
 mod sah;
 mod scale;
@@ -19,10 +20,12 @@ pub use build::BuildProgress;
 pub use lines::{Exit, Line};
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub use parts::{Arrays, Parts};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};
 pub use stats::TreeStats;
 
+use crate::column::Column;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
@@ -30,6 +33,7 @@ use crate::mesh::Mesh;
 use glam::Vec3;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What a traversal kernel asks of a tree.
 ///
@@ -71,20 +75,22 @@ pub trait Tree {
 #[derive(Debug)]
 pub struct KdTree {
     /// The root, an unused place, and then pairs of siblings.
-    nodes: Vec<Node>,
+    nodes: Column<Node>,
     /// Primitive ids, leaf after leaf, each leaf's behind their number.
-    references: Vec<u32>,
+    references: Column<u32>,
     /// The same tree for kernels that trace one ray at a time.
     lines: lines::Lines,
     /// The same tree for kernels that look at many triangles at once.
     pages: pages::Pages,
     /// Records by primitive id.
-    triangles: Vec<Triangle>,
+    triangles: Column<Triangle>,
     bounds: Aabb,
     scale: Scale,
     params: BuildParams,
     /// The most memory that the build took, in bytes.
     build_peak: usize,
+    /// What a walk of the whole tree counts, once someone has asked.
+    stats: OnceLock<TreeStats>,
 }
 
 impl KdTree {
@@ -116,15 +122,16 @@ impl KdTree {
             return Err(Error::Mesh(message.into()));
         }
         Ok(Self {
-            nodes,
-            references: counted,
+            nodes: nodes.into(),
+            references: counted.into(),
             lines,
             pages,
-            triangles,
+            triangles: triangles.into(),
             bounds,
             scale,
             params: params.clone(),
             build_peak: ledger.peak(),
+            stats: OnceLock::new(),
         })
     }
 

@@ -9,7 +9,7 @@ use super::stats::{FrameStats, RayCount, Tally};
 use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
-use crate::scene::{Camera, Lighting};
+use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, Dispatch, Kernel, PacketWidth, RayPacket};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -17,24 +17,24 @@ use std::time::Instant;
 
 /// Makes pictures of one scene with one set of settings.
 #[derive(Debug)]
-pub struct Renderer<'a> {
+pub struct Renderer<'a, S = Mesh> {
     accel: &'a Accel,
-    mesh: &'a Mesh,
+    surface: &'a S,
     settings: RenderSettings,
     tiles: Vec<Tile>,
     /// What workers learnt in the frame before about which kernel is quickest.
     learnt: Mutex<Vec<Dispatch>>,
 }
 
-impl<'a> Renderer<'a> {
-    /// A renderer; `accel` must have been built from `mesh`.
+impl<'a, S: Surface> Renderer<'a, S> {
+    /// A renderer; `accel` must have been built from what `surface` says the corners of.
     ///
     /// # Errors
     /// As [`RenderSettings::check`].
-    pub fn new(accel: &'a Accel, mesh: &'a Mesh, settings: RenderSettings) -> Result<Self> {
+    pub fn new(accel: &'a Accel, surface: &'a S, settings: RenderSettings) -> Result<Self> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
-        Ok(Self { accel, mesh, settings, tiles, learnt: Mutex::default() })
+        Ok(Self { accel, surface, settings, tiles, learnt: Mutex::default() })
     }
 
     /// The settings.
@@ -85,7 +85,7 @@ impl<'a> Renderer<'a> {
         let task = TileTask {
             accel: self.accel,
             calls,
-            shader: Shader::new(self.mesh, lighting, shadows),
+            shader: Shader::new(self.surface, lighting, shadows),
             view: camera.view(size.width, size.height),
             samples,
         };
