@@ -37,11 +37,13 @@
 //!
 //! | room | what is in it |
 //! |---|---|
+//! | [`column`] | arrays that are owned, or lie in a mapped file |
 //! | [`simd`] | vectors of 4, 8 and 16 floats, and the choice of an instruction set at run time |
 //! | [`geometry`] | ray, hit, box, the ray-triangle tests, clipping |
 //! | [`mesh`] | triangle meshes, readers of model files, generators |
 //! | [`kdtree`] | the tree: builder, statistics, validation |
 //! | [`traverse`] | the kernels that take rays through a tree |
+//! | [`store`] | the `.rpk` scene file: written whole, mapped when it is read |
 //! | [`scene`] | camera, camera paths, lights |
 //! | [`render`] | tiles, their scheduler, shading, pictures |
 //! | [`batch`] | rays in bulk on all processors, and NumPy's files of them |
@@ -59,6 +61,7 @@
 
 pub mod batch;
 pub mod cache;
+pub mod column;
 pub mod error;
 pub mod files;
 pub mod geometry;
@@ -68,6 +71,7 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod simd;
+pub mod store;
 pub mod study;
 pub mod traverse;
 

@@ -27,7 +27,7 @@
 //! | `blocks` | all of these at work: asking, loading, giving up |
 //! | `local`, `view` | a thread's state, and the tree as it sees it |
 //! | `plan` | how the memory is divided |
-//! | `source` | where blocks come from |
+//! | `source`, `file` | where blocks come from |
 //!
 //! **Waiting is a thread's.** More threads than processors take part; one that waits for a block keeps its
 //! tile on its stack and lets another have its place. So the kernels need not be cut into pieces that can be
@@ -40,6 +40,7 @@ mod arena;
 mod blocks;
 mod directory;
 mod epoch;
+mod file;
 mod gate;
 mod layout;
 mod local;
@@ -59,7 +60,7 @@ pub use view::View;
 
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
-use crate::kdtree::{Node, Scale};
+use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
 use blocks::{Blocks, Loaders};
 use layout::Layout;
 use local::Local;
@@ -84,8 +85,9 @@ pub struct Resident {
     pub beneath: Vec<u32>,
     /// Bytes of the [arrays](Array) that come in blocks.
     pub bytes: [usize; Array::ALL.len()],
-    /// The most triangles in a page or a leaf.
-    pub most: usize,
+    /// The most blocks that a page or a leaf takes, by their size: see [`KdTree::spread`](
+    /// crate::kdtree::KdTree::spread).
+    pub spread: [usize; SPREAD_BLOCKS.len()],
 }
 
 /// A scene whose blocks come when they are needed.
@@ -118,14 +120,14 @@ impl Cached {
     ) -> Result<Self> {
         options.check()?;
         let layout = Layout::new(resident.bytes, options.block);
-        // A list and its triangles, each of which may lie across two blocks.
-        let list = (resident.most * 4).div_ceil(options.block) + 1;
-        let most = (2 * resident.most + list).min(layout.blocks()).max(2);
+        let size = SPREAD_BLOCKS.iter().position(|&block| block == options.block);
+        let most = resident.spread[size.expect("it was checked")].clamp(2, layout.blocks().max(2));
         let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
         let blocks = memory.saturating_sub(overhead) / options.block;
         let workers = options.loading.workers(threads);
-        let plan =
-            Plan::new(options, blocks.min(layout.blocks() + Plan::least(options, most)), most, workers);
+        // More than would ever be used is left to the system.
+        let blocks = blocks.min(2 * layout.blocks() + Plan::least(options, most));
+        let plan = Plan::new(options, blocks, most, workers);
         let Some(plan) = plan else {
             let least = overhead + Plan::least(options, most) * options.block;
             let message = format!(
@@ -223,6 +225,16 @@ impl Cached {
     /// What the cache did since the last call.
     pub fn take_stats(&self) -> CacheStats {
         self.blocks.take_stats()
+    }
+
+    /// From now on, takes note of uses, or no longer does.
+    pub fn trace_uses(&self, on: bool) {
+        self.blocks.words.trace(on);
+    }
+
+    /// The blocks that were used since the last call, each once a tile, in about the order of use.
+    pub fn take_uses(&self) -> Vec<u32> {
+        self.blocks.words.take_trace()
     }
 
     /// Forgets all that is not in use at the moment.

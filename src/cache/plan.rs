@@ -21,6 +21,9 @@ pub struct CacheOptions {
     pub nodes: Option<(f32, Replacement)>,
     /// Who reads.
     pub loading: Loading,
+    /// Whether reads go past the system's own memory of the file, so that they take what the disk takes. For
+    /// measurements; on Linux.
+    pub direct: bool,
 }
 
 impl Default for CacheOptions {
@@ -32,6 +35,7 @@ impl Default for CacheOptions {
             policy: Replacement::default(),
             nodes: None,
             loading: Loading::Asynchronous { loaders: 8 },
+            direct: false,
         }
     }
 }
@@ -127,6 +131,11 @@ impl Plan {
         Some(Self { shapes, pinned, all: blocks })
     }
 
+    /// Blocks that sets hold.
+    pub fn held(&self) -> usize {
+        self.shapes.iter().flatten().map(Shape::blocks).sum()
+    }
+
     /// The least number of blocks that will do.
     pub fn least(options: &CacheOptions, most: usize) -> usize {
         // Some to hold, some to spare, and the needs of one walk; an eighth may be for other walks.
@@ -157,7 +166,7 @@ mod tests {
                     assert_eq!(Plan::new(&options, least - 1, most, 16), None);
                     for blocks in [least, least + 1, 1000, 100_000] {
                         let plan = Plan::new(&options, blocks, most, 16).expect("enough");
-                        let held: usize = plan.shapes.iter().flatten().map(Shape::blocks).sum();
+                        let held = plan.held();
                         assert!(held >= 2 && plan.pinned >= most);
                         assert!(held + plan.pinned < blocks, "{held} + {} of {blocks}", plan.pinned);
                         let all = held + plan.pinned + (blocks / 16).clamp(4, 128);

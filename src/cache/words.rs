@@ -11,7 +11,8 @@
 //! To see that a block is here is one load. A use writes only if the block was not used in this tick before.
 
 use super::policy::Use;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 const HERE: u32 = 1 << 31;
 const COUNT: u32 = 0x7f << 24;
@@ -20,12 +21,18 @@ const TICK: u32 = ONE - 1;
 
 /// The words of all blocks.
 #[derive(Debug)]
-pub struct Words(Box<[AtomicU32]>);
+pub struct Words {
+    words: Box<[AtomicU32]>,
+    /// First uses in a tick, while they are noted down.
+    trace: Mutex<Vec<u32>>,
+    tracing: AtomicBool,
+}
 
 impl Words {
     /// No block is here.
     pub fn new(blocks: usize) -> Self {
-        Self((0..blocks).map(|_| AtomicU32::new(0)).collect())
+        let words = (0..blocks).map(|_| AtomicU32::new(0)).collect();
+        Self { words, trace: Mutex::default(), tracing: AtomicBool::new(false) }
     }
 
     /// Memory of so many.
@@ -39,7 +46,7 @@ impl Words {
     #[inline(always)]
     pub fn use_in(&self, block: usize, tick: u32) -> bool {
         // What the loader wrote before it said that the block is here is seen from now on.
-        let word = self.0[block].load(Ordering::Acquire);
+        let word = self.words[block].load(Ordering::Acquire);
         word & !COUNT == HERE | (tick & TICK) || self.mark(block, word, tick)
     }
 
@@ -50,35 +57,55 @@ impl Words {
         while word & HERE != 0 {
             let count = if word & COUNT == COUNT { COUNT } else { (word & COUNT) + ONE };
             let new = HERE | count | (tick & TICK);
-            match self.0[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
-                Ok(_) => return true,
+            match self.words[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
+                Ok(_) => {
+                    self.note(block);
+                    return true;
+                }
                 Err(now) => word = now,
             }
         }
         false
     }
 
+    fn note(&self, block: usize) {
+        if self.tracing.load(Ordering::Relaxed) {
+            self.trace.lock().unwrap_or_else(PoisonError::into_inner).push(block as u32);
+        }
+    }
+
+    /// Notes first uses in a tick down from now on, or no longer does.
+    pub fn trace(&self, on: bool) {
+        self.tracing.store(on, Ordering::Relaxed);
+    }
+
+    /// What was noted down since the last call, in about the order of use.
+    pub fn take_trace(&self) -> Vec<u32> {
+        std::mem::take(&mut *self.trace.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Whether a block is here; no use.
     pub fn is_here(&self, block: usize) -> bool {
-        self.0[block].load(Ordering::Acquire) & HERE != 0
+        self.words[block].load(Ordering::Acquire) & HERE != 0
     }
 
     /// How a block was used.
     pub fn uses(&self, block: usize) -> Use {
-        let word = self.0[block].load(Ordering::Relaxed);
+        let word = self.words[block].load(Ordering::Relaxed);
         Use { tick: word & TICK, count: (word & COUNT) / ONE }
     }
 
     /// Says that a block is here, used once; all that was written to it before is seen by who sees that.
     pub fn arrive(&self, block: usize, tick: u32) -> Use {
-        self.0[block].store(HERE | ONE | (tick & TICK), Ordering::Release);
+        self.words[block].store(HERE | ONE | (tick & TICK), Ordering::Release);
+        self.note(block);
         Use { tick: tick & TICK, count: 1 }
     }
 
     /// Says that a block is not here any more: its memory may go when all readers that are in an epoch now
     /// have left it.
     pub fn leave(&self, block: usize) {
-        self.0[block].store(0, Ordering::SeqCst);
+        self.words[block].store(0, Ordering::SeqCst);
     }
 }
 
@@ -99,6 +126,12 @@ mod tests {
         (0..300).for_each(|tick| assert!(words.use_in(1, tick)));
         assert_eq!(words.uses(1), Use { tick: 299, count: 127 });
         assert!(!words.is_here(0) && words.is_here(1));
+        words.trace(true);
+        assert!(words.use_in(1, 300) && words.use_in(1, 300) && !words.use_in(0, 300));
+        words.arrive(0, 301);
+        words.trace(false);
+        assert!(words.use_in(1, 301));
+        assert_eq!((words.take_trace(), words.take_trace()), (vec![1, 0], vec![]));
         words.leave(1);
         assert!(!words.use_in(1, 299));
         assert_eq!(words.uses(1), Use::default());

@@ -1,10 +1,10 @@
 //! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
 
-use super::model::{Model, Scene, SceneReport};
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration, grouped};
+use super::scene::{Looks, Scene, SceneReport};
 use crate::batch::numpy::{read_rays, write_hits, write_occluded};
 use crate::batch::{Batch, Traced};
 use crate::error::{Error, Result};
@@ -46,7 +46,7 @@ use std::time::Instant;
 #[derive(Clone, Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// The model: .obj or .ply
+    /// The model: .obj or .ply, or a .rpk scene file
     scene: PathBuf,
     /// The rays: a .npy file of N x 8 float32
     #[arg(long, value_name = "FILE")]
@@ -98,7 +98,7 @@ struct Report<'a> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = args.build.profile()?;
+    let profile = args.build.profile_for(Some(&args.scene))?;
     let accuracy = args.accuracy.mode()?;
     let kernel = args.kernel()?;
     let threads = args.threads(&profile)?;
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
     let start = Instant::now();
     let rays = read_rays(&args.rays)?;
     let rays_read_seconds = start.elapsed().as_secs_f64();
-    let mut scene = Model::read(&args.scene)?.build(&args.build, &profile.build, isa)?;
+    let mut scene = Scene::prepare(&args.scene, &args.build, &profile.build, isa)?;
     scene.accel.set_accuracy(accuracy);
 
     let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
@@ -179,7 +179,10 @@ impl Args {
             let mut hits = vec![Hit::MISS; rays.len()];
             let traced = watch("tracing", tracing, || batch.intersect(&mut hits));
             let writing = Instant::now();
-            write_hits(&self.output, &hits, &scene.model.mesh)?;
+            match &scene.looks {
+                Looks::Mesh(mesh) => write_hits(&self.output, &hits, mesh)?,
+                Looks::Stored(stored) => write_hits(&self.output, &hits, stored)?,
+            }
             let count = hits.iter().filter(|hit| hit.is_hit()).count() as u64;
             Ok((traced, count, writing.elapsed().as_secs_f64()))
         }

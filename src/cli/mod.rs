@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod bench;
+mod build;
 mod cast;
 mod generate;
 mod histogram;
@@ -15,6 +16,7 @@ mod outputs;
 mod progress;
 mod render;
 mod report;
+mod scene;
 mod tune;
 
 use clap::{ArgAction, Parser, Subcommand};
@@ -36,6 +38,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Args),
+    Build(build::Args),
     Info(info::Args),
     Bench(bench::Args),
     Accuracy(accuracy::Args),
@@ -50,6 +53,7 @@ pub fn main() -> ExitCode {
     log(cli.verbose);
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
+        Command::Build(args) => build::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Accuracy(args) => accuracy::run(args),

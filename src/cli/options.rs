@@ -6,6 +6,8 @@ use crate::geometry::Accuracy;
 use crate::kdtree::{BuildParams, Preset};
 use crate::mesh::Mesh;
 use crate::profile::{self, Profile};
+use crate::store::is_scene;
+use std::path::Path;
 use tracing::info;
 
 /// `--accuracy`.
@@ -61,6 +63,26 @@ impl BuildOptions {
             profile.build = BuildParams::preset(preset.parse::<Preset>()?);
         }
         Ok(profile)
+    }
+
+    /// The same for a scene, whose tree may be built already.
+    ///
+    /// # Errors
+    /// Likewise, or an option would have another tree built of a scene file.
+    pub fn profile_for(&self, scene: Option<&Path>) -> Result<Profile> {
+        let profile = self.profile()?;
+        let Some(file) = scene.filter(|scene| is_scene(scene)) else { return Ok(profile) };
+        let given = [("--preset", self.preset.is_some()), ("--memory", self.memory.is_some())];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => {
+                let message = format!(
+                    "the tree in {} is built already: leave this out, or give it to raypack build",
+                    file.display()
+                );
+                Err(Error::option(option, message))
+            }
+            None => Ok(profile),
+        }
     }
 
     /// Sees to it that a build stays within the memory given.

@@ -3,16 +3,17 @@
 mod heat;
 mod report;
 
-use super::model::{Model, Scene};
+use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
+use super::scene::{Looks, Scene};
 use crate::error::{Error, Result};
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
 use crate::render::{RenderSettings, Renderer, Size, Tuning};
-use crate::scene::{Camera, Lighting, Orbit};
+use crate::scene::{Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::study::heat::Cost;
 use crate::traverse::Kernel;
@@ -36,7 +37,7 @@ const MAX_FRAMES: u32 = 100_000;
 /// RAYPACK_ISA=portable|avx2|avx512 forces an instruction set.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply; without it, the built-in process plant
+    /// The model: .obj or .ply, or a .rpk scene file; without it, the built-in process plant
     scene: Option<PathBuf>,
     #[command(flatten)]
     outputs: Outputs,
@@ -96,7 +97,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     // Everything that can be wrong with the options, before any work.
     let isa = Isa::from_env()?;
-    let profile = args.build.profile()?;
+    let profile = args.build.profile_for(args.scene.as_deref())?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
@@ -108,37 +109,51 @@ pub fn run(args: &Args) -> Result<()> {
     info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
-    let model = args.scene.as_deref().map_or_else(|| Ok(Model::demo()), Model::read)?;
-    let mut scene = model.build(&args.build, &profile.build, isa)?;
+    let mut scene = match &args.scene {
+        Some(path) => Scene::prepare(path, &args.build, &profile.build, isa)?,
+        None => Model::demo().build(&args.build, &profile.build, isa)?,
+    };
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
     if let Some(cost) = heatmap {
         return heat::run(&scene, camera, settings.size, cost, args.outputs.picture(), &args.json);
     }
-    let lighting = args.lighting(&camera, &scene);
-    let renderer = Renderer::new(&scene.accel, &scene.model.mesh, settings)?;
-
     let cameras: Vec<Camera> = orbit.map_or_else(|| vec![camera], |orbit| orbit.cameras(camera).collect());
-    let mut shots = Vec::with_capacity(cameras.len());
-    let tiles_done = AtomicUsize::new(0);
-    let tiles = renderer.tile_count() * cameras.len();
-    let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
-    watch("rendering", fraction, || {
-        for (number, camera) in (0..).zip(cameras) {
-            let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
-            let file = args.outputs.write(&frame, number, args.orbit)?;
-            debug!("frame {number} in {:.4} s", stats.seconds);
-            shots.push(Shot { file, camera, stats });
-        }
-        Ok::<(), Error>(())
-    })?;
-
-    let report = Report::new(&scene, renderer.settings(), args.build.name(), shots);
-    args.json.give(&report.text(&scene), &report)
+    match &scene.looks {
+        Looks::Mesh(mesh) => args.render(&scene, mesh, settings, cameras),
+        Looks::Stored(stored) => args.render(&scene, stored, settings, cameras),
+    }
 }
 
 impl Args {
+    /// Renders a frame for each camera, the first of which the light is made for, and reports.
+    fn render(
+        &self,
+        scene: &Scene,
+        surface: &impl Surface,
+        settings: RenderSettings,
+        cameras: Vec<Camera>,
+    ) -> Result<()> {
+        let lighting = self.lighting(&cameras[0], scene);
+        let renderer = Renderer::new(&scene.accel, surface, settings)?;
+        let mut shots = Vec::with_capacity(cameras.len());
+        let tiles_done = AtomicUsize::new(0);
+        let tiles = renderer.tile_count() * cameras.len();
+        let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
+        watch("rendering", fraction, || {
+            for (number, camera) in (0..).zip(cameras) {
+                let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
+                let file = self.outputs.write(&frame, number, self.orbit)?;
+                debug!("frame {number} in {:.4} s", stats.seconds);
+                shots.push(Shot { file, camera, stats });
+            }
+            Ok::<(), Error>(())
+        })?;
+        let report = Report::new(scene, renderer.settings(), self.build.name(), shots);
+        self.json.give(&report.text(scene), &report)
+    }
+
     fn settings(&self, profile: &Profile) -> Result<RenderSettings> {
         let size = match &self.size {
             Some(text) => text.parse()?,

@@ -34,10 +34,12 @@
 //! one another lies together.
 
 use super::node::Node;
+use crate::column::Column;
 use crate::geometry::Aabb;
+use bytemuck::{Pod, Zeroable};
 
 /// A treelet.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Line {
     /// Planes, by place.
@@ -106,7 +108,7 @@ const PLACES: [usize; 7] = [0, 1, 5, 2, 3, 6, 7];
 
 /// All lines. The root is line 0, which no exit leads to.
 #[derive(Debug, Default)]
-pub struct Lines(Vec<Line>);
+pub struct Lines(Column<Line>);
 
 impl Lines {
     /// Packs a tree whose references are [`counted`].
@@ -114,6 +116,11 @@ impl Lines {
         let empty = Line { planes: [f32::INFINITY; 8], exits: [0; 8] };
         let mut lines = vec![empty; count(nodes, nodes[0])];
         Treelets { nodes }.fill(&mut lines, 0, nodes[0], bounds, 0);
+        Self(lines.into())
+    }
+
+    /// Lines that were packed before.
+    pub fn of_packed(lines: Column<Line>) -> Self {
         Self(lines)
     }
 

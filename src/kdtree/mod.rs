@@ -9,9 +9,11 @@ mod memory;
 mod node;
 mod pages;
 mod params;
+mod parts;
 mod preset;
 mod sah;
 mod scale;
+mod spread;
 mod stats;
 mod validate;
 
@@ -19,16 +21,20 @@ pub use build::BuildProgress;
 pub use lines::{Exit, Line};
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub use parts::{Arrays, Parts};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};
+pub use spread::SPREAD_BLOCKS;
 pub use stats::TreeStats;
 
+use crate::column::Column;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What a traversal kernel asks of a tree.
 ///
@@ -75,20 +81,22 @@ pub trait Tree {
 #[derive(Debug)]
 pub struct KdTree {
     /// The root, an unused place, and then pairs of siblings.
-    nodes: Vec<Node>,
+    nodes: Column<Node>,
     /// Primitive ids, leaf after leaf, each leaf's behind their number.
-    references: Vec<u32>,
+    references: Column<u32>,
     /// The same tree for kernels that trace one ray at a time.
     lines: lines::Lines,
     /// The same tree for kernels that look at many triangles at once.
     pages: pages::Pages,
     /// Records by primitive id.
-    triangles: Vec<Triangle>,
+    triangles: Column<Triangle>,
     bounds: Aabb,
     scale: Scale,
     params: BuildParams,
     /// The most memory that the build took, in bytes.
     build_peak: usize,
+    /// What a walk of the whole tree counts, once someone has asked.
+    stats: OnceLock<TreeStats>,
 }
 
 impl KdTree {
@@ -120,15 +128,16 @@ impl KdTree {
             return Err(Error::Mesh(message.into()));
         }
         Ok(Self {
-            nodes,
-            references: counted,
+            nodes: nodes.into(),
+            references: counted.into(),
             lines,
             pages,
-            triangles,
+            triangles: triangles.into(),
             bounds,
             scale,
             params: params.clone(),
             build_peak: ledger.peak(),
+            stats: OnceLock::new(),
         })
     }
 

@@ -11,8 +11,10 @@
 //!
 //! Siblings are adjacent: the child above the plane follows the one below it.
 
+use bytemuck::{Pod, Zeroable};
+
 /// An inner node or a leaf.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C, align(8))]
 pub struct Node {
     payload: u32,

@@ -14,6 +14,7 @@
 //! ```
 
 use super::node::Node;
+use crate::column::Column;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -23,11 +24,11 @@ use std::sync::atomic::Ordering::Relaxed;
 #[derive(Debug, Default)]
 pub(super) struct Pages {
     /// The root, an unused place, and then pairs of siblings. A leaf's references are its page's.
-    pub upper: Vec<Node>,
+    pub upper: Column<Node>,
     /// The indices of the full tree's nodes at the same places.
-    pub beneath: Vec<u32>,
+    pub beneath: Column<u32>,
     /// Primitive ids, page after page, ascending in each.
-    pub primitives: Vec<u32>,
+    pub primitives: Column<u32>,
 }
 
 impl Pages {
@@ -38,14 +39,27 @@ impl Pages {
         let cutter = Cutter { nodes, references, limit, fits };
         cutter.find(0, 0, &mut Vec::new());
 
-        let mut pages = Self { upper: vec![Node::leaf(0, 0); 2], ..Self::default() };
-        pages.beneath = vec![0; 2];
+        let mut cut = Cut { upper: vec![Node::leaf(0, 0); 2], beneath: vec![0; 2], primitives: Vec::new() };
         let mut roots = Vec::new();
-        pages.place(&cutter, 0, 0, &mut roots);
-        pages.fill(&cutter, &roots);
-        pages
+        cut.place(&cutter, 0, 0, &mut roots);
+        cut.fill(&cutter, &roots);
+        Self { upper: cut.upper.into(), beneath: cut.beneath.into(), primitives: cut.primitives.into() }
     }
 
+    /// Memory.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.upper[..]) + size_of_val(&self.beneath[..]) + size_of_val(&self.primitives[..])
+    }
+}
+
+/// [`Pages`] in the making.
+struct Cut {
+    upper: Vec<Node>,
+    beneath: Vec<u32>,
+    primitives: Vec<u32>,
+}
+
+impl Cut {
     /// Puts the node `index` of the full tree to the upper place `at`, and what is below it behind; the
     /// places of pages, which stay empty, go to `roots`.
     fn place(&mut self, cutter: &Cutter, index: usize, at: usize, roots: &mut Vec<usize>) {
@@ -89,11 +103,6 @@ impl Pages {
             }
             self.primitives.extend(primitives);
         }
-    }
-
-    /// Memory.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.upper[..]) + size_of_val(&self.beneath[..]) + size_of_val(&self.primitives[..])
     }
 }
 

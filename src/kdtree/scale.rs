@@ -30,6 +30,17 @@ impl Scale {
         Self { exponent: exponent.clamp(*ORDINARY.start(), *ORDINARY.end()) - exponent }
     }
 
+    /// The one that multiplies by `2^exponent`; `None` if no finite coordinates call for it.
+    pub fn of_exponent(exponent: i32) -> Option<Self> {
+        let called_for = ORDINARY.end() - 127..=ORDINARY.start() + 149;
+        called_for.contains(&exponent).then_some(Self { exponent })
+    }
+
+    /// The exponent of the power of two that it multiplies by.
+    pub fn exponent(self) -> i32 {
+        self.exponent
+    }
+
     /// Whether it leaves everything as it is.
     #[inline(always)]
     pub fn is_none(self) -> bool {
@@ -87,9 +98,11 @@ mod tests {
             let bounds = Aabb { min: Vec3::new(0.0, -greatest, 0.0), max: Vec3::splat(greatest * 0.5) };
             let scale = Scale::of_bounds(&bounds);
             assert_eq!(scale.exponent, exponent, "{greatest:e}");
+            assert_eq!(Scale::of_exponent(exponent), Some(scale));
             let scaled = scale.apply(&[[greatest; 3]; 3])[0][0];
             assert!(scaled == greatest || (0.9e-9..2.2e12).contains(&scaled), "{scaled:e}");
             assert_eq!(scale.undo(&[[scaled; 3]; 3]), [[greatest; 3]; 3]);
         }
+        assert_eq!([-88, 120].map(Scale::of_exponent), [None, None]);
     }
 }

@@ -3,10 +3,11 @@
 use super::{KdTree, Node, Tree};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a tree looks like and what a ray is expected to pay in it.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TreeStats {
     /// Triangles that the tree sorts.
     pub triangles: usize,
@@ -67,8 +68,13 @@ impl TreeStats {
 const HISTOGRAM: usize = 32;
 
 impl KdTree {
-    /// Walks the whole tree and counts.
+    /// Figures about the tree. The first call walks all of it, unless a file has told them.
     pub fn stats(&self) -> TreeStats {
+        self.stats.get_or_init(|| self.count()).clone()
+    }
+
+    /// Walks the whole tree and counts.
+    fn count(&self) -> TreeStats {
         let mut stats = TreeStats {
             triangles: self.triangles.len(),
             leaf_histogram: vec![0; HISTOGRAM + 1],

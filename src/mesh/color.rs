@@ -77,7 +77,7 @@ pub fn linear_to_srgb(light: f32) -> u8 {
 
 /// An sRGB triple in linear light.
 #[inline]
-pub(super) fn decode(srgb: [u8; 3]) -> Vec3 {
+pub(crate) fn decode(srgb: [u8; 3]) -> Vec3 {
     Vec3::from_array(srgb.map(srgb_to_linear))
 }
 

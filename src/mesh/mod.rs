@@ -6,12 +6,14 @@
 mod check;
 mod color;
 pub mod generate;
+mod join;
 pub mod obj;
 pub mod ply;
 mod read;
 mod shape;
 
 pub use check::MAX_TRIANGLES;
+pub(crate) use color::decode;
 pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
 pub use shape::{DECADES, Shapes};
@@ -59,6 +61,15 @@ impl Mesh {
                 (1.0 - u - v) * c0 + u * c1 + v * c2
             }
             Colors::PerMaterial { materials, of_triangle } => materials[of_triangle[i] as usize].diffuse,
+        }
+    }
+
+    /// The index of a triangle's material; 0 if the mesh has none. Panics if `primitive` is out of range.
+    #[inline]
+    pub fn material(&self, primitive: u32) -> u32 {
+        match &self.colors {
+            Colors::PerMaterial { of_triangle, .. } => of_triangle[primitive as usize],
+            _ => 0,
         }
     }
 

@@ -9,16 +9,16 @@ use super::stats::{FrameStats, RayCount, Tally, quantile};
 use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
-use crate::scene::{Camera, Lighting};
+use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Makes pictures of one scene with one set of settings.
 #[derive(Debug)]
-pub struct Renderer<'a> {
+pub struct Renderer<'a, S = Mesh> {
     accel: &'a Accel,
-    mesh: &'a Mesh,
+    surface: &'a S,
     settings: RenderSettings,
     tiles: Vec<Tile>,
     /// What workers learnt in the frames before about which kernel is quickest.
@@ -27,16 +27,16 @@ pub struct Renderer<'a> {
     frames: AtomicUsize,
 }
 
-impl<'a> Renderer<'a> {
-    /// A renderer; `accel` must have been built from `mesh`.
+impl<'a, S: Surface> Renderer<'a, S> {
+    /// A renderer; `accel` must have been built from what `surface` says the corners of.
     ///
     /// # Errors
     /// As [`RenderSettings::check`].
-    pub fn new(accel: &'a Accel, mesh: &'a Mesh, settings: RenderSettings) -> Result<Self> {
+    pub fn new(accel: &'a Accel, surface: &'a S, settings: RenderSettings) -> Result<Self> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
         let learnt = DispatchPool::default();
-        Ok(Self { accel, mesh, settings, tiles, learnt, frames: AtomicUsize::new(0) })
+        Ok(Self { accel, surface, settings, tiles, learnt, frames: AtomicUsize::new(0) })
     }
 
     /// The settings.
@@ -109,7 +109,7 @@ impl<'a> Renderer<'a> {
         let task = TileTask {
             accel: self.accel,
             calls,
-            shader: Shader::new(self.mesh, lighting, shadows),
+            shader: Shader::new(self.surface, lighting, shadows),
             view: camera.view(size.width, size.height),
             samples,
         };

@@ -2,14 +2,13 @@
 
 use super::offset::offset_point;
 use crate::geometry::{Hit, Ray};
-use crate::mesh::Mesh;
-use crate::scene::Lighting;
+use crate::scene::{Lighting, Surface};
 use glam::{DVec3, Vec3};
 
 /// Shades hits. The arithmetic is plain `f32` lane by lane: the same for every packet width and
 /// instruction set.
-pub(super) struct Shader<'a> {
-    mesh: &'a Mesh,
+pub(super) struct Shader<'a, S> {
+    surface: &'a S,
     lighting: Lighting,
     shadows: bool,
 }
@@ -28,9 +27,9 @@ pub(super) struct Shade {
     pub normal: Vec3,
 }
 
-impl<'a> Shader<'a> {
-    pub fn new(mesh: &'a Mesh, lighting: &Lighting, shadows: bool) -> Self {
-        Self { mesh, lighting: *lighting, shadows }
+impl<'a, S: Surface> Shader<'a, S> {
+    pub fn new(surface: &'a S, lighting: &Lighting, shadows: bool) -> Self {
+        Self { surface, lighting: *lighting, shadows }
     }
 
     /// Shades what `ray` hit. Both sides of a surface look alike.
@@ -40,10 +39,10 @@ impl<'a> Shader<'a> {
             let (base, depth) = (self.sky(ray.direction), f32::INFINITY);
             return Shade { base, key: Vec3::ZERO, shadow: None, depth, normal: Vec3::ZERO };
         }
-        let corners = self.mesh.corners(hit.primitive);
+        let corners = self.surface.corners(hit.primitive);
         let normal = unit_normal(hit.normal, corners);
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        let color = self.mesh.color(hit.primitive, hit.u, hit.v);
+        let color = self.surface.color(hit.primitive, hit.u, hit.v);
         let mut shade = Shade {
             base: color * self.lighting.ambient.irradiance(normal),
             key: Vec3::ZERO,
@@ -100,6 +99,7 @@ fn unit_normal(normal: Vec3, corners: [Vec3; 3]) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Mesh;
     use crate::scene::{Ambient, Light};
 
     fn floor(size: f32) -> Mesh {

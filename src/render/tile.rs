@@ -6,7 +6,7 @@ use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
-use crate::scene::View;
+use crate::scene::{Surface, View};
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
 use glam::Vec3;
 use std::time::Instant;
@@ -86,10 +86,10 @@ impl Calls<16> {
 }
 
 /// All that a tile's rendering reads.
-pub(super) struct TileTask<'a, const W: usize> {
+pub(super) struct TileTask<'a, S, const W: usize> {
     pub accel: &'a Accel,
     pub calls: Calls<W>,
-    pub shader: Shader<'a>,
+    pub shader: Shader<'a, S>,
     pub view: View,
     pub samples: u32,
 }
@@ -174,7 +174,7 @@ fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-impl<const W: usize> TileTask<'_, W>
+impl<S: Surface, const W: usize> TileTask<'_, S, W>
 where
     RayPacket<W>: PacketWidth<W>,
 {

@@ -1,16 +1,18 @@
 //! What is looked at, from where, in what light.
 //!
 //! [`Camera`] says where the eye is; [`View`] makes its rays for one image size; [`Orbit`] moves
-//! it; [`Lighting`] is the light that falls on the scene.
+//! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on.
 
 mod camera;
 mod framing;
 mod light;
 mod parse;
 mod path;
+mod surface;
 mod view;
 
 pub use camera::{Camera, DEFAULT_FOV};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use path::Orbit;
+pub use surface::{CachedSurface, Surface};
 pub use view::View;

@@ -4,7 +4,7 @@ use super::header::Header;
 use crate::error::Result;
 use crate::files::write_whole;
 use crate::geometry::Hit;
-use crate::mesh::{Colors, Mesh};
+use crate::scene::Surface;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
@@ -25,13 +25,13 @@ const MISS: i64 = -1;
 ///
 /// Ids are int64, the type that NumPy itself indexes with: `3 * primitive` cannot overflow.
 /// Readers make one mesh of all objects of a file, and what tells its parts apart are its materials, in
-/// the order in which `raypack info` lists them. `mesh` is the one that the hits' ids belong to.
+/// the order in which `raypack info` lists them. `surface` is the one that the hits' ids belong to.
 ///
 /// # Errors
 /// [`Error::Write`](crate::Error::Write); nothing is left behind then.
-pub fn write_hits(path: &Path, hits: &[Hit], mesh: &Mesh) -> Result<()> {
+pub fn write_hits(path: &Path, hits: &[Hit], surface: &impl Surface) -> Result<()> {
     let id = |hit: &Hit| if hit.is_hit() { i64::from(hit.primitive) } else { MISS };
-    let geometry = |hit: &Hit| if hit.is_hit() { material(mesh, hit.primitive) } else { MISS };
+    let geometry = |hit: &Hit| if hit.is_hit() { surface.material(hit.primitive).into() } else { MISS };
     let all = hits.len() as u64;
     write_whole(path, |file| {
         let mut archive = ZipWriter::new(file);
@@ -55,14 +55,6 @@ pub fn write_occluded(path: &Path, occluded: &[bool]) -> Result<()> {
         add(&mut archive, "occluded", &[occluded.len() as u64], occluded.iter().copied())?;
         archive.finish().map(drop).map_err(io::Error::other)
     })
-}
-
-/// Which part of the model a triangle belongs to.
-fn material(mesh: &Mesh, primitive: u32) -> i64 {
-    match &mesh.colors {
-        Colors::PerMaterial { of_triangle, .. } => of_triangle[primitive as usize].into(),
-        _ => 0,
-    }
 }
 
 /// A type of NumPy's.

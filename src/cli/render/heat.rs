@@ -1,8 +1,8 @@
 //! `raypack render --heatmap`: a picture of what pixels cost.
 
-use crate::cli::model::{Scene, SceneReport};
 use crate::cli::progress::watch;
 use crate::cli::report::{ENGINE, Engine, Json, Lines};
+use crate::cli::scene::{Scene, SceneReport};
 use crate::error::Result;
 use crate::render::Size;
 use crate::render::image::write_heat;

@@ -1,7 +1,7 @@
 //! What `render` reports: the scene, the machine's part, and what each frame cost.
 
-use crate::cli::model::{Scene, SceneReport};
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
+use crate::cli::scene::{Scene, SceneReport};
 use crate::geometry::Accuracy;
 use crate::render::{FrameStats, RayCount, RenderSettings, Size};
 use crate::scene::Camera;

@@ -1,12 +1,13 @@
 //! A triangle as the tree keeps it.
 
 use super::{Corners, normal_in_double};
+use bytemuck::{Pod, Zeroable};
 
 /// Corners, and the plane that they lie in: 48 bytes, three quarters of a cache line.
 ///
 /// The normal takes double precision to be any good for slivers. It is needed wherever a ray comes out
 /// inside of a triangle's edges, by one packet after the other, so it is worked out once and kept.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Triangle {
     /// `corners[corner][axis]`.

@@ -1,0 +1,165 @@
+//! `raypack build MODEL... -o scene.rpk`: models to one scene file.
+
+use super::model::Model;
+use super::options::BuildOptions;
+use super::outputs::same_file;
+use super::progress::Bar;
+use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration};
+use super::scene::{BuildMemory, Looks, Origin, Scene, describe_size, describe_tree};
+use crate::error::{Error, Result};
+use crate::files::check_writable;
+use crate::kdtree::{BuildParams, TreeStats};
+use crate::mesh::{Mesh, ReadReport};
+use crate::simd::Isa;
+use crate::store::{Section, Written, is_scene, write};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Build a scene file of models, which every command then opens at once
+///
+/// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
+/// become one scene. Primitive ids run on from model to model in the order in which they are named.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Args {
+    /// The models: .obj or .ply, or .rpk scene files, whose trees are built anew
+    #[arg(required = true, value_name = "MODEL")]
+    models: Vec<PathBuf>,
+    /// The scene file: .rpk
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    #[command(flatten)]
+    build: BuildOptions,
+    #[command(flatten)]
+    json: Json,
+}
+
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    engine: Engine,
+    models: &'a [ModelReport],
+    triangles: usize,
+    vertices: u64,
+    build_seconds: f64,
+    build_memory: BuildMemory,
+    build_params: &'a BuildParams,
+    tree: &'a TreeStats,
+    /// Seconds of checksums and of writing, until all is on the disk.
+    write_seconds: f64,
+    file: &'a Path,
+    bytes: u64,
+    sections: &'a [Section],
+}
+
+/// What was read of a model.
+#[derive(Debug, Serialize)]
+struct ModelReport {
+    model: String,
+    triangles: usize,
+    vertices: usize,
+    read_seconds: f64,
+    /// What the reader has to say; `None` for a scene file.
+    read_report: Option<ReadReport>,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<()> {
+    let isa = Isa::from_env()?;
+    let profile = args.build.profile()?;
+    args.check_output()?;
+    args.json.check()?;
+
+    let (model, models) = read(&args.models)?;
+    let source = model.name.clone();
+    let scene = model.build(&args.build, &profile.build, isa)?;
+    let start = Instant::now();
+    let written = args.write(&scene, &source)?;
+    let write_seconds = start.elapsed().as_secs_f64();
+
+    let (build_seconds, build_memory) = match scene.origin {
+        Origin::Built { build_seconds, build_memory, .. } => (build_seconds, build_memory),
+        Origin::Opened { .. } => unreachable!("it was built"),
+    };
+    let report = Report {
+        engine: ENGINE,
+        models: &models,
+        triangles: scene.tree.triangles,
+        vertices: scene.vertices,
+        build_seconds,
+        build_memory,
+        build_params: scene.accel.tree().params(),
+        tree: &scene.tree,
+        write_seconds,
+        file: &args.output,
+        bytes: written.bytes,
+        sections: &written.sections,
+    };
+    args.json.give(&text(&report), &report)
+}
+
+/// Reads models and makes them one.
+fn read(paths: &[PathBuf]) -> Result<(Model, Vec<ModelReport>)> {
+    let (mut meshes, mut reports) = (Vec::new(), Vec::new());
+    for path in paths {
+        let model = Model::read(path)?;
+        reports.push(ModelReport {
+            model: model.name,
+            triangles: model.mesh.triangles.len(),
+            vertices: model.mesh.positions.len(),
+            read_seconds: model.seconds,
+            read_report: model.report,
+        });
+        meshes.push(model.mesh);
+    }
+    let names: Vec<&str> = reports.iter().map(|report| &*report.model).collect();
+    let seconds = reports.iter().map(|report| report.read_seconds).sum();
+    let model = Model { name: names.join(", "), mesh: Mesh::join(meshes)?, report: None, seconds };
+    Ok((model, reports))
+}
+
+impl Args {
+    /// Finds out before any work whether the scene file can be written, and is not one of the other files.
+    fn check_output(&self) -> Result<()> {
+        if !is_scene(&self.output) {
+            let expected = "a scene file is written as .rpk";
+            return Err(Error::UnknownFormat { path: self.output.clone(), expected });
+        }
+        let others = self.models.iter().map(PathBuf::as_path).chain(self.json.file());
+        if others.into_iter().any(|other| same_file(&self.output, other)) {
+            let message =
+                format!("{} is named twice; give each file a name of its own", self.output.display());
+            return Err(Error::option("--output", message));
+        }
+        check_writable(&self.output)
+    }
+
+    fn write(&self, scene: &Scene, source: &str) -> Result<Written> {
+        let Looks::Mesh(mesh) = &scene.looks else { unreachable!("it was built of a mesh") };
+        let bar = Bar::new("writing");
+        write(&self.output, mesh, scene.accel.tree(), source, &|part| bar.set(part))
+    }
+}
+
+fn text(report: &Report<'_>) -> String {
+    let mut lines = Lines::default();
+    for model in report.models {
+        lines.add("model", &model.model);
+        if report.models.len() > 1 {
+            describe_size(&mut lines, model.triangles as u64, model.vertices as u64);
+        }
+        lines.add("read", duration(model.read_seconds));
+        let summary = model.read_report.as_ref().map(ReadReport::summary).unwrap_or_default();
+        if !summary.is_empty() {
+            lines.add("repaired", summary);
+        }
+    }
+    if report.models.len() > 1 {
+        lines.add("scene", counted(report.models.len() as u64, "model"));
+    }
+    describe_size(&mut lines, report.triangles as u64, report.vertices);
+    report.build_memory.describe(&mut lines, report.build_seconds);
+    describe_tree(&mut lines, report.tree);
+    let (file, size, time) = (report.file.display(), bytes(report.bytes), duration(report.write_seconds));
+    lines.add("wrote", format!("{file}, {size}, in {time}"));
+    lines.text().to_owned()
+}

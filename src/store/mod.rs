@@ -1,0 +1,46 @@
+//! The `.rpk` scene file: a mesh, its colours and its tree, made ready for tracing.
+//!
+//! [`write()`] makes one; [`File::open`] maps one. All arrays lie in it as they do in memory, so that opening a
+//! scene costs no parsing and no building: [`File::tree`] gives the tree that was written, [`File::stored`] its
+//! surfaces, [`File::mesh`] the mesh. Every block of 4 KiB has a checksum; what is handed out has been checked,
+//! and [`File::verify`] checks everything. `format.md` beside this file has every byte.
+//!
+//! | file | what it says |
+//! |---|---|
+//! | `header` | the first block: what the file is, how long, where its tables are |
+//! | `section` | the section table: which arrays lie where |
+//! | `checksum` | blocks and their checksums |
+//! | `meta` | what is known about the scene, as JSON |
+//! | `layout` | where a writer puts everything |
+//! | `writer` | a scene to a file |
+//! | `reader` | a file, mapped |
+//! | `load` | a file's arrays as tree and mesh |
+//! | `stored` | a file's surfaces, for shading |
+
+mod checksum;
+mod header;
+mod layout;
+mod load;
+mod meta;
+mod reader;
+mod section;
+mod stored;
+mod writer;
+
+pub use checksum::{BLOCK, of_block as block_checksum};
+pub use header::VERSION;
+pub use meta::{ColorMeta, MaterialMeta, Meta};
+pub use reader::File;
+pub use section::{Kind, Section};
+pub use stored::{Paint, Stored};
+pub use writer::{Written, write};
+
+use std::path::Path;
+
+/// Whether a path's ending says that it is a scene file.
+pub fn is_scene(path: impl AsRef<Path>) -> bool {
+    path.as_ref().extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rpk"))
+}
+
+#[cfg(test)]
+mod tests;
