@@ -91,7 +91,7 @@ struct Memory {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = args.build.profile_for(Some(&args.model))?;
+    let profile = args.build.profile_for(Some(&args.model), false)?;
     args.json.check()?;
     let file = args.file()?;
     let (scene, mesh) = match &file {
@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let mesh = match (&scene.looks, &mesh) {
         (Looks::Mesh(mesh), _) | (_, Some(mesh)) => mesh,
-        (Looks::Stored(_), None) => unreachable!("a stored scene was read from its file"),
+        (_, None) => unreachable!("a stored scene was read from its file"),
     };
     if args.validate {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));

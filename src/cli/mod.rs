@@ -6,6 +6,7 @@
 mod accuracy;
 mod bench;
 mod build;
+mod cache_options;
 mod cast;
 mod generate;
 mod histogram;

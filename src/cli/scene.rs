@@ -1,16 +1,20 @@
 //! What commands trace: a model and its tree, just built, or a scene file.
 
+use super::cache_options::taken_so_far;
 use super::model::Model;
 use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
+use crate::cache::{CacheOptions, Cached};
 use crate::error::Result;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::{Mesh, ReadReport};
+use crate::scene::CachedSurface;
 use crate::simd::Isa;
 use crate::store::{self, Stored, is_scene};
 use crate::traverse::Accel;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 use tracing::info;
 
@@ -36,6 +40,8 @@ pub enum Looks {
     Mesh(Mesh),
     /// The scene file.
     Stored(Stored),
+    /// The scene file, of which a part is in memory.
+    Cached(CachedSurface),
 }
 
 /// How a scene came here.
@@ -129,13 +135,36 @@ impl Scene {
         let start = Instant::now();
         let accel = Accel::of_tree(file.tree()?).with_isa(isa);
         let looks = Looks::Stored(file.stored()?);
-        let open_seconds = start.elapsed().as_secs_f64();
+        let tree = accel.stats();
+        Ok(Self::of_file(file, accel, tree, looks, start.elapsed().as_secs_f64()))
+    }
+
+    /// The scene in a scene file, of which a part is in memory: all that the process takes is to stay within
+    /// `memory`, with `beside` for what is still to come, while `threads` are at work.
+    ///
+    /// # Errors
+    /// The file is damaged where it is read now, or the memory is too little.
+    pub fn open_within(
+        file: &store::File,
+        options: &CacheOptions,
+        [memory, beside]: [usize; 2],
+        threads: usize,
+        isa: Isa,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let cached = Arc::new(Cached::open(file, options, memory, beside + taken_so_far(), threads)?);
+        let accel = Accel::of_cached(Arc::clone(&cached)).with_isa(isa);
+        let looks = Looks::Cached(CachedSurface::new(cached, file));
+        Ok(Self::of_file(file, accel, file.meta().stats.clone(), looks, start.elapsed().as_secs_f64()))
+    }
+
+    fn of_file(file: &store::File, accel: Accel, tree: TreeStats, looks: Looks, open_seconds: f64) -> Self {
         info!("opened {} in {}", file.path().display(), duration(open_seconds));
         let meta = file.meta();
-        Ok(Self {
+        Self {
             name: file.path().display().to_string(),
             vertices: meta.vertices,
-            tree: accel.stats(),
+            tree,
             accel,
             looks,
             origin: Origin::Opened {
@@ -144,7 +173,18 @@ impl Scene {
                 source: meta.source.clone(),
                 made_by: meta.engine.clone(),
             },
-        })
+        }
+    }
+
+    /// Does something that traces. What of the scene cannot be read meanwhile is an error.
+    ///
+    /// # Errors
+    /// The scene file cannot be read.
+    pub fn reading<R>(&self, work: impl FnOnce() -> R) -> Result<R> {
+        match self.accel.cached() {
+            Some(cached) => cached.or_error(work),
+            None => Ok(work()),
+        }
     }
 
     /// The report's part about model and tree.

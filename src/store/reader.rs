@@ -94,7 +94,7 @@ impl File {
     /// The first block that is damaged.
     pub fn verify(&self, progress: &(dyn Fn(f64) + Sync)) -> Result<()> {
         // The first block was checked when it was opened.
-        self.verify_blocks(&[1..self.checksums.len()], progress)
+        self.verify_blocks(std::slice::from_ref(&(1..self.checksums.len())), progress)
     }
 
     /// Checks the blocks of some sections, unless that was done. Those that are not there are whole.
@@ -111,7 +111,8 @@ impl File {
     /// Checks a section's first block.
     pub(super) fn verify_first_block(&self, kind: Kind) -> Result<()> {
         let blocks = self.section(kind).map_or(0..0, Section::blocks);
-        self.verify_blocks(&[blocks.start..blocks.end.min(blocks.start + 1)], &|_| ())
+        let first = blocks.start..blocks.end.min(blocks.start + 1);
+        self.verify_blocks(&[first], &|_| ())
     }
 
     fn verify_blocks(&self, blocks: &[Range<usize>], progress: &(dyn Fn(f64) + Sync)) -> Result<()> {
