@@ -128,15 +128,15 @@ impl Blocks {
     /// for who has one must not wait for those who are to give up pins when they have one again.
     pub fn gather(&self, loaders: &Loaders, wanted: &[u32]) -> Gathered<'_> {
         let taken = self.quota.take(wanted.len());
-        let (mut gone, mut absent, mut missed) = (Vec::new(), Vec::new(), 0);
+        let (mut absent, mut missed) = (Vec::new(), 0);
         for &block in wanted {
-            let asked = self.directory(block).pin(block, &self.words, &self.pins, &mut gone);
+            let gone = &mut |gone| self.retire(gone);
+            let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
             missed += u64::from(asked != Asked::Here);
             if asked == Asked::Absent {
                 absent.push(block);
             }
         }
-        self.retire(&gone);
         match &loaders.requests {
             Some(requests) => {
                 absent.iter().for_each(|&block| requests.send(block).expect("loaders outlive who waits"));
@@ -150,15 +150,12 @@ impl Blocks {
         Gathered { blocks: self, pinned: wanted.to_vec(), taken }
     }
 
-    /// Takes note of blocks that have been declared gone.
-    fn retire(&self, gone: &[u32]) {
-        if gone.is_empty() {
-            return;
-        }
-        add(&self.counters.evictions, gone.len() as u64);
+    /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
+    /// again, who would not find it here.
+    fn retire(&self, gone: u32) {
+        add(&self.counters.evictions, 1);
         let mut retired = self.retired();
-        let epoch = self.epochs.retire();
-        retired.extend(gone.iter().map(|&block| (epoch, block)));
+        retired.push_back((self.epochs.retire(), gone));
     }
 
     fn retired(&self) -> MutexGuard<'_, VecDeque<(u64, u32)>> {
@@ -215,11 +212,9 @@ impl Blocks {
 
     /// Gives up what sets hold beyond their ways, because it was pinned when it came.
     fn shrink(&self) {
-        let mut gone = Vec::new();
         for directory in self.directories.iter().flatten() {
-            directory.shrink(&self.words, &self.pins, &mut gone);
+            directory.shrink(&self.words, &self.pins, &mut |gone| self.retire(gone));
         }
-        self.retire(&gone);
     }
 
     /// Brings a block that the directory has said is absent.
@@ -289,9 +284,7 @@ impl Blocks {
     /// Gives up everything that is not in use, as if nothing had been read yet.
     pub fn clear(&self) {
         for directory in self.directories.iter().flatten() {
-            let mut gone = Vec::new();
-            directory.clear(&self.words, &self.pins, &mut gone);
-            self.retire(&gone);
+            directory.clear(&self.words, &self.pins, &mut |gone| self.retire(gone));
         }
         self.reclaim();
     }
@@ -331,6 +324,90 @@ impl Array {
             Self::Pages => "pages",
             Self::Triangles => "triangles",
             Self::Colors => "colours",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::local::Local;
+    use super::super::policy::Replacement;
+    use super::*;
+
+    const BLOCK: usize = 4096;
+
+    /// Blocks full of their own number.
+    #[derive(Debug)]
+    struct Numbered;
+
+    impl Source for Numbered {
+        fn read(&self, _: Array, byte: usize, into: &mut [u8]) -> crate::error::Result<()> {
+            into.as_chunks_mut::<4>().0.fill(((byte / BLOCK) as u32 + 1).to_le_bytes());
+            Ok(())
+        }
+    }
+
+    /// Threads that ask for blocks at random, hold some for a while, and look whether they are what they
+    /// should be, in a cache that is much too small for all.
+    fn stress(threads: usize, options: &CacheOptions, rounds: u32) {
+        const BLOCKS: usize = 60;
+        let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0], BLOCK);
+        let most = 3;
+        let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
+        let (blocks, loaders) =
+            Blocks::new(layout, Box::new(Numbered), options, &plan, threads).expect("starts");
+        thread::scope(|scope| {
+            for number in 0..threads as u32 {
+                let (blocks, loaders) = (&blocks, &loaders);
+                scope.spawn(move || {
+                    let mut state = number.wrapping_mul(0x9e37_79b9) | 1;
+                    let mut random = |below: usize| {
+                        state ^= state << 13;
+                        state ^= state >> 17;
+                        state ^= state << 5;
+                        state as usize % below
+                    };
+                    let local = Local::take(blocks);
+                    for _ in 0..rounds {
+                        let wanted: Vec<u32> = (0..=random(most)).map(|_| random(BLOCKS) as u32).collect();
+                        let gathered = blocks.gather(loaders, &wanted);
+                        local.reader.enter();
+                        drop(gathered);
+                        let found = || {
+                            wanted.iter().all(|&block| {
+                                // SAFETY: it was here when the epoch was entered, which goes on.
+                                let words = unsafe { blocks.arena.fill(block as usize * BLOCK, BLOCK) };
+                                words.as_chunks::<4>().0.iter().all(|word| *word == (block + 1).to_le_bytes())
+                            })
+                        };
+                        assert!(found(), "{wanted:?} at once");
+                        (0..random(4)).for_each(|_| thread::yield_now());
+                        assert!(found(), "{wanted:?} later in the epoch");
+                        local.reader.leave();
+                    }
+                    local.put();
+                });
+            }
+        });
+        assert!(blocks.committed_bytes()[1] <= plan.all * BLOCK);
+        assert!(blocks.take_stats().evictions > u64::from(rounds));
+    }
+
+    #[test]
+    fn blocks_are_what_they_should_be_for_as_long_as_they_are_read() {
+        for (i, policy) in Replacement::ALL.into_iter().enumerate() {
+            for loading in [Loading::Synchronous, Loading::Asynchronous { loaders: 3 }] {
+                let options = CacheOptions {
+                    block: BLOCK,
+                    ways: [1, 2, 5][i % 3],
+                    stripes: [1, 3][i % 2],
+                    policy,
+                    nodes: None,
+                    loading,
+                    direct: false,
+                };
+                stress(6, &options, 3000);
+            }
         }
     }
 }

@@ -101,14 +101,14 @@ impl Pins {
 
 impl Set {
     /// Declares blocks gone until there are no more than `ways`, or all the others are pinned.
-    fn make_room(&mut self, ways: usize, words: &Words, pins: &Pins, gone: &mut Vec<u32>) {
+    fn make_room(&mut self, ways: usize, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
         let uses =
             |block: u32| -> Option<Use> { (!pins.is_pinned(block)).then(|| words.uses(block as usize)) };
         while self.ways.len() + self.coming > ways {
             let Some(victim) = self.policy.victim(&mut self.ways, &uses) else { break };
             let victim = self.ways.remove(victim).block;
             words.leave(victim as usize);
-            gone.push(victim);
+            gone(victim);
         }
     }
 }
@@ -135,8 +135,11 @@ impl Directory {
         (stripe, stripe.sets.lock().unwrap_or_else(PoisonError::into_inner), set / self.shape.stripes)
     }
 
-    /// Pins a block and asks for it. What must go for it is declared gone, and put into `gone`.
-    pub fn pin(&self, block: u32, words: &Words, pins: &Pins, gone: &mut Vec<u32>) -> Asked {
+    /// Pins a block and asks for it. What must go for it is declared gone, and `gone` is told.
+    ///
+    /// `gone` is told while the lock is held: from then on somebody else may ask for that block, and must find
+    /// it among those that are on their way out.
+    pub fn pin(&self, block: u32, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) -> Asked {
         let (_, mut sets, at) = self.lock(block);
         // Under the lock, so that nobody is giving it up at the moment.
         pins.0[block as usize].fetch_add(1, Ordering::AcqRel);
@@ -181,16 +184,16 @@ impl Directory {
         }
     }
 
-    /// Declares blocks gone that sets hold beyond their ways, but for pinned ones, and puts them into `gone`.
-    pub fn shrink(&self, words: &Words, pins: &Pins, gone: &mut Vec<u32>) {
+    /// Declares blocks gone that sets hold beyond their ways, but for pinned ones, and tells `gone`.
+    pub fn shrink(&self, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
         for stripe in &self.stripes {
             let mut sets = stripe.sets.lock().unwrap_or_else(PoisonError::into_inner);
             sets.sets.iter_mut().for_each(|set| set.make_room(self.shape.ways, words, pins, gone));
         }
     }
 
-    /// Declares all blocks gone that are not pinned, and puts them into `gone`.
-    pub fn clear(&self, words: &Words, pins: &Pins, gone: &mut Vec<u32>) {
+    /// Declares all blocks gone that are not pinned, and tells `gone`.
+    pub fn clear(&self, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
         for stripe in &self.stripes {
             let mut sets = stripe.sets.lock().unwrap_or_else(PoisonError::into_inner);
             for set in &mut sets.sets {
@@ -198,7 +201,7 @@ impl Directory {
                     let stays = pins.is_pinned(way.block);
                     if !stays {
                         words.leave(way.block as usize);
-                        gone.push(way.block);
+                        gone(way.block);
                     }
                     stays
                 });
@@ -236,7 +239,7 @@ mod tests {
 
         fn pin(&self, block: u32) -> (Asked, Vec<u32>) {
             let mut gone = Vec::new();
-            let asked = self.directory.pin(block, &self.words, &self.pins, &mut gone);
+            let asked = self.directory.pin(block, &self.words, &self.pins, &mut |block| gone.push(block));
             (asked, gone)
         }
 
