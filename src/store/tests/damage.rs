@@ -148,7 +148,7 @@ fn a_section_table_that_lies_is_refused() {
     lie(Kind::Nodes, |e| e.kind = 99, "there is no kind 99");
     lie(Kind::Nodes, |e| e.element = 4, "nodes has elements of 8 bytes, not 4");
     lie(Kind::Nodes, |e| e.count += 1, "nodes cannot have");
-    lie(Kind::Nodes, |e| e.count = (1 << 61) + e.count, "nodes cannot have");
+    lie(Kind::Nodes, |e| e.count += 1 << 61, "nodes cannot have");
     lie(Kind::Nodes, |e| e.offset += 8, "between two pages");
     lie(Kind::Triangles, |e| e.offset = 65_536, "inside of what is before it");
     lie(Kind::Triangles, |e| e.offset = 0, "inside of what is before it");
