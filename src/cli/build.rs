@@ -5,7 +5,7 @@ use super::options::BuildOptions;
 use super::outputs::same_file;
 use super::progress::Bar;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration};
-use super::scene::{BuildMemory, Looks, Origin, Scene, describe_size, describe_tree};
+use super::scene::{BuildMemory, Origin, Scene, describe_size, describe_tree};
 use crate::error::{Error, Result};
 use crate::files::check_writable;
 use crate::kdtree::{BuildParams, TreeStats};
@@ -134,7 +134,7 @@ impl Args {
     }
 
     fn write(&self, scene: &Scene, source: &str) -> Result<Written> {
-        let Looks::Mesh(mesh) = &scene.looks else { unreachable!("it was built of a mesh") };
+        let mesh = scene.mesh().expect("it was built of a mesh");
         let bar = Bar::new("writing");
         write(&self.output, mesh, scene.accel.tree(), source, &|part| bar.set(part))
     }

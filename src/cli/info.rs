@@ -1,19 +1,20 @@
 //! `raypack info SCENE`: what is in a model or a scene file, and what its tree is like.
 
+mod file;
+
 use super::histogram::{bars, decades};
 use super::options::BuildOptions;
-use super::progress::Bar;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, grouped};
-use super::scene::{Looks, Scene, SceneReport};
+use super::scene::{Scene, SceneReport};
 use crate::error::{Error, Result};
 use crate::geometry::Hit;
-use crate::kdtree::{BuildParams, TreeStats};
+use crate::kdtree::TreeStats;
 use crate::mesh::{Colors, Mesh, Shapes};
 use crate::scene::Camera;
 use crate::simd::Isa;
-use crate::store::{self, Section, is_scene};
 use crate::study::bench::build::count::{Counts, count};
 use crate::study::rays::{RayKind, RaySets, Setup};
+use file::FileReport;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -50,16 +51,6 @@ struct Report<'a> {
     validated: bool,
 }
 
-/// What a scene file says about itself.
-#[derive(Debug, Serialize)]
-struct FileReport<'a> {
-    version: u32,
-    sections: &'a [Section],
-    build_params: &'a BuildParams,
-    /// `true` if every checksum was checked; it is an error if one is wrong.
-    verified: bool,
-}
-
 /// Where the triangles' colours come from.
 #[derive(Debug, Serialize)]
 struct ColorReport<'a> {
@@ -93,15 +84,12 @@ pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
     let profile = args.build.profile_for(Some(&args.model), false)?;
     args.json.check()?;
-    let file = args.file()?;
-    let (scene, mesh) = match &file {
+    let file = file::open(&args.model, args.verify)?;
+    let (scene, copy) = match &file {
         Some(file) => (Scene::open(file, isa)?, Some(file.mesh()?)),
         None => (Scene::prepare(&args.model, &args.build, &profile.build, isa)?, None),
     };
-    let mesh = match (&scene.looks, &mesh) {
-        (Looks::Mesh(mesh), _) | (_, Some(mesh)) => mesh,
-        (_, None) => unreachable!("a stored scene was read from its file"),
-    };
+    let mesh = copy.as_ref().or(scene.mesh()).expect("what no scene file holds was built of its mesh");
     if args.validate {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
         scene.accel.tree().validate().map_err(fault)?;
@@ -111,37 +99,13 @@ pub fn run(args: &Args) -> Result<()> {
         engine: ENGINE,
         scene: scene.report().with_duplication(&duplication),
         colors: colors(mesh),
-        file: file.as_ref().map(|file| FileReport {
-            version: store::VERSION,
-            sections: file.sections(),
-            build_params: &file.meta().params,
-            verified: args.verify,
-        }),
+        file: file.as_ref().map(|file| FileReport::new(file, args.verify)),
         memory: memory(mesh, &scene.tree),
         shapes: Shapes::of(mesh),
         random_rays: random_rays(&scene, mesh),
         validated: args.validate,
     };
     args.json.give(&text(&scene, &report, &duplication), &report)
-}
-
-impl Args {
-    /// The scene file, checked if that is wanted; `None` for a model.
-    fn file(&self) -> Result<Option<store::File>> {
-        if !is_scene(&self.model) {
-            if self.verify {
-                let message = format!("{} has no checksums; scene files (.rpk) do", self.model.display());
-                return Err(Error::option("--verify", message));
-            }
-            return Ok(None);
-        }
-        let file = store::File::open(&self.model)?;
-        if self.verify {
-            let bar = Bar::new("verifying");
-            file.verify(&|part| bar.set(part))?;
-        }
-        Ok(Some(file))
-    }
 }
 
 /// Random rays are as many as a square image of this side has pixels.
@@ -272,30 +236,10 @@ fn text(scene: &Scene, report: &Report<'_>, duplication: &[usize]) -> String {
         ),
     );
     if let Some(file) = &report.file {
-        describe_file(&mut lines, file);
+        file.describe(&mut lines);
     }
     if report.validated {
         lines.add("valid", "every triangle is found in every leaf that it overlaps");
     }
     lines.text().to_owned()
-}
-
-/// Lines about a scene file: its sections, and what its tree was built with.
-fn describe_file(lines: &mut Lines, file: &FileReport<'_>) {
-    let sections = counted(file.sections.len() as u64, "section");
-    lines.add("file", format!("version {}, {sections}", file.version));
-    for Section { kind, offset, bytes: length, count } in file.sections {
-        let (length, count) = (bytes(*length), grouped(*count));
-        lines.add("", format!("{kind:<20} {length:>9} at byte {offset}, {count} x {}", kind.element()));
-    }
-    let params = serde_json::to_value(file.build_params).expect("they are plain data");
-    let settings = params.as_object().into_iter().flatten().map(|(key, value)| match value.as_f64() {
-        // As the shortest number that is the same in single precision.
-        Some(number) if value.is_f64() => format!("{key} {}", number as f32),
-        _ => format!("{key} {}", value.to_string().trim_matches('"')),
-    });
-    lines.add("built with", settings.collect::<Vec<_>>().join(", "));
-    if file.verified {
-        lines.add("verified", "every checksum is right");
-    }
 }

@@ -187,6 +187,14 @@ impl Scene {
         }
     }
 
+    /// The mesh that it was built of; `None` for a scene file.
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match &self.looks {
+            Looks::Mesh(mesh) => Some(mesh),
+            Looks::Stored(_) | Looks::Cached(_) => None,
+        }
+    }
+
     /// The report's part about model and tree.
     pub fn report(&self) -> SceneReport<'_> {
         let bounds = self.accel.bounds();

@@ -40,7 +40,7 @@ pub(super) struct Header {
     /// XXH3 of the checksum table.
     pub checksums_hash: u64,
     block: u32,
-    reserved: [u8; 52],
+    reserved: [u32; 13],
     /// XXH3 of the first block, these eight bytes taken for zeros.
     hash: u64,
 }
@@ -62,7 +62,7 @@ impl Header {
             checksums_count: checksums.len() as u64,
             checksums_hash: of_table(table),
             block: BLOCK as u32,
-            reserved: [0; 52],
+            reserved: [0; 13],
             hash: 0,
         }
     }
@@ -127,7 +127,7 @@ impl Header {
             table_offset: TABLE as u64,
             table_entry: ENTRY as u32,
             block: BLOCK as u32,
-            reserved: [0; 52],
+            reserved: [0; 13],
             ..*self
         };
         let blocks = self.checksums_offset / BLOCK as u64;

@@ -11,6 +11,7 @@ use memmap2::Mmap;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -94,7 +95,8 @@ impl File {
     /// The first block that is damaged.
     pub fn verify(&self, progress: &(dyn Fn(f64) + Sync)) -> Result<()> {
         // The first block was checked when it was opened.
-        self.verify_blocks(std::slice::from_ref(&(1..self.checksums.len())), progress)
+        let all = 1..self.checksums.len();
+        self.verify_blocks(slice::from_ref(&all), progress)
     }
 
     /// Checks the blocks of some sections, unless that was done. Those that are not there are whole.

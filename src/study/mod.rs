@@ -5,6 +5,7 @@
 
 pub mod accuracy;
 pub mod bench;
+pub mod cache;
 pub mod heat;
 #[cfg(feature = "peers")]
 pub mod peers;

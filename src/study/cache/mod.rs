@@ -5,10 +5,11 @@
 //! (*cold*) and once more with what the first time has left (*warm*), beside the resident scene; and it tells
 //! how many misses the best of all policies would have had on the same uses (`minimum`).
 //!
-//! The system keeps files in its own memory. Unless it is told to forget a file ([`Options::drop_caches`]), a
-//! read costs some microseconds instead of what the disk takes: reports say which.
+//! The system keeps files in its own memory, where a read costs some microseconds instead of what the disk
+//! takes. [`CacheOptions::direct`] goes past that; reports say which it was.
 
 pub mod minimum;
+#[cfg(feature = "accuracy")]
 pub mod plot;
 mod report;
 
@@ -19,7 +20,7 @@ use crate::cache::{CacheOptions, Cached, Loading};
 use crate::error::Result;
 use crate::geometry::Accuracy;
 use crate::render::{RenderSettings, Renderer, Size};
-use crate::scene::{CachedSurface, Camera, Lighting, Orbit};
+use crate::scene::{CachedSurface, Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::store;
 use crate::study::bench::machine;
@@ -46,14 +47,15 @@ pub struct Options {
     pub loadings: Vec<Loading>,
     /// All else about the caches.
     pub cache: CacheOptions,
+    /// The part of the memory that nodes have to themselves, in a cache of the same policy; `None` for one
+    /// cache of all.
+    pub nodes: Option<f32>,
     /// Threads at work.
     pub threads: usize,
     /// How hits are decided.
     pub accuracy: Accuracy,
     /// The instruction set.
     pub isa: Isa,
-    /// Whether the system is told to forget the file before each cold run, and reads bypass its memory.
-    pub direct: bool,
 }
 
 /// One cache.
@@ -72,7 +74,8 @@ impl Options {
         for &budget in &self.budgets {
             for &policy in &self.policies {
                 for &loading in &self.loadings {
-                    let options = CacheOptions { policy, loading, ..self.cache };
+                    let nodes = self.nodes.map(|part| (part, policy));
+                    let options = CacheOptions { policy, loading, nodes, ..self.cache };
                     trials.push(Trial { budget, options });
                 }
             }
@@ -86,19 +89,19 @@ impl Options {
 /// # Errors
 /// The file cannot be read, or is damaged; a budget is too small for the scene.
 pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Result<Report> {
-    let flight = Flight::new(file, options)?;
+    // The resident scene, warm, is what all are compared with.
+    let resident = Accel::of_tree(file.tree()?).with_isa(options.isa).with_accuracy(options.accuracy);
+    let flight = Flight::new(file, &resident, options);
     let trials = options.trials();
     let steps = 2 * (trials.len() + 1);
     let done = AtomicUsize::new(0);
     let step = || progress(done.fetch_add(1, Ordering::Relaxed) as f64 / steps as f64);
 
-    // The resident scene, warm, is what all are compared with.
-    let resident = Accel::of_tree(file.tree()?).with_isa(options.isa).with_accuracy(options.accuracy);
     let surface = file.stored()?;
     let renderer = Renderer::new(&resident, &surface, flight.settings.clone())?;
-    flight.fly(&resident, &renderer, None)?;
+    flight.fly(&renderer, None)?;
     step();
-    let frames = flight.fly(&resident, &renderer, None)?;
+    let frames = flight.fly(&renderer, None)?;
     step();
     let mut rows = vec![Row::resident(frames)];
     drop((renderer, surface, resident));
@@ -107,16 +110,16 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
         let memory = (flight.data as f64 * trial.budget) as usize;
         let cached = Cached::open(file, &trial.options, memory, 0, options.threads)?;
         let cached = Arc::new(cached);
-        let accel = Accel::of_cached(Arc::clone(&cached)).with_isa(options.isa).with_accuracy(options.accuracy);
-        let surface = CachedSurface::new(Arc::clone(&cached), file)?;
+        let accel =
+            Accel::of_cached(Arc::clone(&cached)).with_isa(options.isa).with_accuracy(options.accuracy);
+        let surface = CachedSurface::new(Arc::clone(&cached), file);
         let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
         cached.trace_uses(true);
         for warm in [false, true] {
-            let frames = flight.fly(&accel, &renderer, Some(&cached))?;
+            let frames = flight.fly(&renderer, Some(&cached))?;
             let uses = cached.take_uses();
-            let held = cached.plan().held();
-            let minimum = minimum::misses(&uses, held, warm);
-            rows.push(Row::cached(&trial, warm, memory, held, &cached, frames, uses.len() as u64, minimum));
+            let minimum = minimum::misses(&uses, cached.plan().held(), warm);
+            rows.push(Row::cached(&trial, warm, memory, &cached, frames, [uses.len() as u64, minimum]));
             step();
         }
     }
@@ -133,27 +136,19 @@ struct Flight {
 }
 
 impl Flight {
-    fn new(file: &store::File, options: &Options) -> Result<Self> {
-        let tree = file.tree()?;
-        let accel = Accel::of_tree(tree).with_isa(options.isa);
-        let camera = options.camera.unwrap_or_else(|| {
-            Camera::framing(&accel.bounds(), options.size.width as f32 / options.size.height as f32)
-        });
-        let lighting = Lighting::for_view(&camera, &accel);
+    fn new(file: &store::File, accel: &Accel, options: &Options) -> Self {
+        let camera =
+            options.camera.unwrap_or_else(|| Camera::framing(&accel.bounds(), options.size.aspect()));
+        let lighting = Lighting::for_view(&camera, accel);
         let mut settings = RenderSettings::new(options.size);
         settings.shadows = options.shadows;
         settings.tuning.threads = options.threads;
         let cameras = options.orbit.cameras(camera).collect();
-        Ok(Self { cameras, lighting, settings, data: Cached::data_bytes_of(file) })
+        Self { cameras, lighting, settings, data: Cached::data_bytes_of(file) }
     }
 
     /// Renders all frames, and says what each took.
-    fn fly<S: crate::scene::Surface>(
-        &self,
-        _accel: &Accel,
-        renderer: &Renderer<'_, S>,
-        cached: Option<&Cached>,
-    ) -> Result<Vec<FrameRow>> {
+    fn fly<S: Surface>(&self, renderer: &Renderer<'_, S>, cached: Option<&Cached>) -> Result<Vec<FrameRow>> {
         let frame = |camera: &Camera| {
             let (_, stats) = renderer.frame_with_progress(camera, &self.lighting, &AtomicUsize::new(0))?;
             let cache = cached.map(Cached::take_stats).unwrap_or_default();
@@ -178,7 +173,7 @@ impl Flight {
             frames: self.cameras.len(),
             step_degrees: options.orbit.step,
             shadows: options.shadows,
-            direct: options.direct,
+            direct: options.cache.direct,
             threads: options.threads,
             isa: options.isa.name(),
             accuracy: options.accuracy,

@@ -4,8 +4,9 @@ use super::report::{Report, Row};
 use crate::cache::Loading;
 use crate::cache::policy::Replacement;
 use crate::error::Result;
-use crate::study::plot::{self, Area, Drawn};
+use crate::study::plot::{self, Drawing, Drawn};
 use crate::study::text::grouped;
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -18,10 +19,7 @@ const HEADER: u32 = 60;
 /// # Errors
 /// The ending is unknown or the file cannot be written; nothing is left behind then.
 pub fn write(path: &Path, report: &Report) -> Result<()> {
-    let panels = panels(report);
-    let rows = (panels.len() as u32).div_ceil(2).max(1);
-    let size = (2 * PANEL.0, HEADER + rows * PANEL.1);
-    plot::write(path, size, Plot { report, panels: &panels, rows })
+    plot::write(path, &Plot { report, panels: panels(report) })
 }
 
 /// The caches of one budget and pass.
@@ -45,28 +43,37 @@ fn panels(report: &Report) -> Vec<Panel<'_>> {
 
 struct Plot<'a> {
     report: &'a Report,
-    panels: &'a [Panel<'a>],
-    rows: u32,
+    panels: Vec<Panel<'a>>,
 }
 
-impl plot::Draw for Plot<'_> {
-    fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> Drawn<B>
-    where
-        B::ErrorType: 'static,
-    {
+impl Plot<'_> {
+    fn rows(&self) -> u32 {
+        (self.panels.len() as u32).div_ceil(2).max(1)
+    }
+}
+
+impl Drawing for Plot<'_> {
+    fn size(&self) -> (u32, u32) {
+        (2 * PANEL.0, HEADER + self.rows() * PANEL.1)
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn {
         area.fill(&WHITE)?;
         let (header, panels) = area.split_vertically(HEADER);
-        let Report { scene, triangles, size, threads, isa, processor, raypack, build, date, direct, .. } = self.report;
+        let Report { scene, triangles, size, threads, isa, processor, raypack, build, date, direct, .. } =
+            self.report;
         let name = Path::new(scene).file_name().map_or(scene.as_str().into(), |name| name.to_string_lossy());
         let reads = if *direct { "reads from the disk" } else { "reads through the system's memory" };
         let lines = [
             format!("A camera path through caches: {name}, {} triangles, {size}", grouped(*triangles)),
-            format!("{threads} threads, {isa}, {processor}, {reads}, raypack {raypack} ({build} build), {date}; dashed: resident; thin: synchronous"),
+            format!(
+                "{threads} threads, {isa}, {processor}, {reads}, raypack {raypack} ({build} build), {date}; dashed: resident; thin: synchronous"
+            ),
         ];
         for (i, (line, size)) in lines.into_iter().zip([18, 12]).enumerate() {
             header.draw(&Text::new(line, (14, 8 + 24 * i as i32), ("sans-serif", size)))?;
         }
-        let cells = panels.split_evenly((self.rows as usize, 2));
+        let cells = panels.split_evenly((self.rows() as usize, 2));
         let resident = self.report.rows.first();
         self.panels.iter().zip(&cells).try_for_each(|(panel, cell)| draw_panel(cell, panel, resident))
     }
@@ -89,10 +96,11 @@ fn rates(row: &Row) -> impl Iterator<Item = (f64, f64)> {
     (1..).zip(&row.frames).map(|(i, frame)| (f64::from(i), frame.rays as f64 / frame.seconds * 1e-6))
 }
 
-fn draw_panel<B: DrawingBackend>(area: &Area<B>, panel: &Panel<'_>, resident: Option<&Row>) -> Drawn<B>
-where
-    B::ErrorType: 'static,
-{
+fn draw_panel<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    panel: &Panel<'_>,
+    resident: Option<&Row>,
+) -> Drawn {
     let frames = panel.rows.iter().map(|row| row.frames.len()).max().unwrap_or(1) as f64;
     let all = panel.rows.iter().copied().chain(resident);
     let top = all.flat_map(rates).fold(0.0, |top: f64, (_, rate)| top.max(rate)) * 1.08;

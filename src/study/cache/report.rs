@@ -165,7 +165,7 @@ pub struct Report {
     pub step_degrees: f64,
     /// Whether there are shadow rays.
     pub shadows: bool,
-    /// Whether reads bypassed the system's own memory of the file.
+    /// Whether reads went past the system's own memory of the file.
     pub direct: bool,
     /// Threads at work.
     pub threads: usize,
@@ -222,8 +222,22 @@ impl fmt::Display for Report {
         writeln!(f, "reads go {how}\n")?;
         let resident = self.rows.first().map_or(1.0, |row| row.rays_per_s);
         let head = [
-            "in memory", "policy", "loading", "pass", "Mrays/s", "of resident", "x paper", "hits %",
-            "blocks read", "least", "MB read", "stalled s", "loaders idle %", "tile ms p50", "p99", "frame ms",
+            "in memory",
+            "policy",
+            "loading",
+            "pass",
+            "Mrays/s",
+            "of resident",
+            "x paper",
+            "hits %",
+            "blocks read",
+            "least",
+            "MB read",
+            "stalled s",
+            "loaders idle %",
+            "tile ms p50",
+            "p99",
+            "frame ms",
         ];
         let mut lines = vec![head.map(String::from).to_vec()];
         for row in &self.rows {
@@ -270,19 +284,27 @@ impl Report {
         budgets.dedup();
         for budget in budgets {
             for warm in [false, true] {
-                let rows: Vec<&Row> = self.rows.iter().filter(|r| r.policy.is_some() && r.budget == budget && r.warm == warm).collect();
+                let rows: Vec<&Row> = self
+                    .rows
+                    .iter()
+                    .filter(|r| r.policy.is_some() && r.budget == budget && r.warm == warm)
+                    .collect();
                 let pass = if warm { "warm" } else { "cold" };
                 writeln!(f, "\nMrays/s by frame, {:.0} % in memory, {pass}", budget * 100.0)?;
                 let name = |row: &&Row| {
                     let name = row.name();
                     name.split(' ').skip(2).take(2).collect::<Vec<_>>().join(" ")
                 };
-                let mut lines = vec![std::iter::once("frame".to_string()).chain(rows.iter().map(name)).collect::<Vec<_>>()];
+                let mut lines = vec![
+                    std::iter::once("frame".to_string()).chain(rows.iter().map(name)).collect::<Vec<_>>(),
+                ];
                 for frame in 0..self.frames {
                     let rate = |row: &&Row| {
                         row.frames.get(frame).map_or("-".into(), |f| figure(f.rays as f64 / f.seconds * 1e-6))
                     };
-                    lines.push(std::iter::once((frame + 1).to_string()).chain(rows.iter().map(rate)).collect());
+                    lines.push(
+                        std::iter::once((frame + 1).to_string()).chain(rows.iter().map(rate)).collect(),
+                    );
                 }
                 f.write_str(&grid(&lines))?;
             }
