@@ -104,7 +104,8 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
     let frames = flight.fly(&renderer, None)?;
     step();
     let mut rows = vec![Row::resident(frames)];
-    drop((renderer, surface, resident));
+    drop(renderer);
+    drop((surface, resident));
 
     for trial in trials {
         let memory = (flight.data as f64 * trial.budget) as usize;

@@ -92,7 +92,7 @@ fn color(policy: Replacement) -> RGBColor {
     }
 }
 
-fn rates(row: &Row) -> impl Iterator<Item = (f64, f64)> {
+fn rates(row: &Row) -> impl Iterator<Item = (f64, f64)> + Clone {
     (1..).zip(&row.frames).map(|(i, frame)| (f64::from(i), frame.rays as f64 / frame.seconds * 1e-6))
 }
 
