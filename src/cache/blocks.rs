@@ -273,7 +273,7 @@ impl Blocks {
 
     /// What was done since the last call.
     pub fn take_stats(&self) -> CacheStats {
-        self.counters.take()
+        self.counters.take(self.words.take_uses())
     }
 
     /// Bytes of blocks that have memory, and the most that ever had.

@@ -16,7 +16,6 @@ pub struct Local {
     depth: u32,
     /// Whether the outermost use has a place at the gate.
     at_gate: bool,
-    lookups: Cell<u64>,
     stalled: Cell<Duration>,
 }
 
@@ -37,7 +36,6 @@ impl Local {
                 reader: blocks.epochs.reader().expect("fewer than 4096 threads use a scene"),
                 depth: 0,
                 at_gate: false,
-                lookups: Cell::new(0),
                 stalled: Cell::new(Duration::ZERO),
             }),
         }
@@ -83,7 +81,6 @@ impl Local {
             self.at_gate = false;
             self.blocks.gate.as_ref().expect("it was passed").leave();
         }
-        add(&self.blocks.counters.lookups, self.lookups.take());
     }
 
     /// Lets another thread go on while this one waits.
@@ -98,12 +95,6 @@ impl Local {
         if self.at_gate {
             self.blocks.gate.as_ref().expect("it was passed").resume();
         }
-    }
-
-    /// Counts look-ups.
-    #[inline(always)]
-    pub fn looked_up(&self, count: u64) {
-        self.lookups.set(self.lookups.get() + count);
     }
 
     /// Counts time that was spent waiting.

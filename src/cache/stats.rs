@@ -7,8 +7,8 @@ use std::time::Duration;
 /// Counts of a cache's work, since it was opened or [reset](Counters::take).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CacheStats {
-    /// Times that a walk asked whether a block is here.
-    pub lookups: u64,
+    /// Uses of blocks: a tile that needs a block again and again uses it once.
+    pub uses: u64,
     /// Blocks that were waited for.
     pub misses: u64,
     /// Blocks that were read.
@@ -24,16 +24,16 @@ pub struct CacheStats {
 }
 
 impl CacheStats {
-    /// The share of look-ups that found their block.
+    /// The share of uses that did not wait for their block.
     pub fn hit_ratio(&self) -> f64 {
-        if self.lookups == 0 { 1.0 } else { 1.0 - self.misses as f64 / self.lookups as f64 }
+        // Who waits for two blocks may miss one of them twice.
+        if self.uses == 0 { 1.0 } else { (1.0 - self.misses as f64 / self.uses as f64).max(0.0) }
     }
 }
 
 /// The same, while it is counted.
 #[derive(Debug, Default)]
 pub struct Counters {
-    pub lookups: AtomicU64,
     pub misses: AtomicU64,
     pub loads: AtomicU64,
     pub bytes_read: AtomicU64,
@@ -53,11 +53,11 @@ pub fn nanos(time: Duration) -> u64 {
 }
 
 impl Counters {
-    /// The counts so far; begins again from 0.
-    pub fn take(&self) -> CacheStats {
+    /// The counts so far, beside so many uses; begins again from 0.
+    pub fn take(&self, uses: u64) -> CacheStats {
         let take = |counter: &AtomicU64| counter.swap(0, Ordering::Relaxed);
         CacheStats {
-            lookups: take(&self.lookups),
+            uses,
             misses: take(&self.misses),
             loads: take(&self.loads),
             bytes_read: take(&self.bytes_read),

@@ -147,10 +147,7 @@ fn pictures_are_those_of_the_resident_scene() {
             let frames = scene.frames(&accel, threads).expect("can be read");
             assert!(frames == expected, "{options:?}, {more} more, {threads} threads");
             let stats = cached.take_stats();
-            assert!(
-                stats.loads > 0 && stats.misses >= stats.loads && stats.lookups > stats.misses,
-                "{stats:?}"
-            );
+            assert!(stats.loads > 0 && stats.misses >= stats.loads && stats.uses > stats.loads, "{stats:?}");
             let [now, most] = cached.memory_bytes();
             assert!(now <= most && most <= cached.plan().all * options.block, "{now}, {most}: {options:?}");
             if more == 10_000 {

@@ -1,8 +1,10 @@
 //! The tree as one thread sees it, for the length of one query.
 
 use super::Cached;
-use super::layout::Array;
+use super::blocks::Blocks;
+use super::layout::{Array, Column};
 use super::local::Local;
+use super::words::Words;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::{Node, Scale, Tree};
@@ -18,8 +20,39 @@ use std::time::{Duration, Instant};
 #[derive(Debug)]
 pub struct View<'a> {
     cached: &'a Cached,
-    local: Option<Box<Local>>,
+    words: &'a Words,
+    nodes: Part<Node>,
+    references: Part<u32>,
+    pages: Part<u32>,
+    triangles: Part<Triangle>,
+    shift: u32,
     tick: u32,
+    local: Option<Box<Local>>,
+}
+
+/// An array, found with few loads.
+#[derive(Clone, Copy, Debug)]
+struct Part<T> {
+    first: *const T,
+    count: usize,
+    /// Its first byte in the arena.
+    base: usize,
+}
+
+impl<T> Part<T> {
+    #[inline(always)]
+    fn new(blocks: &Blocks, array: Array) -> Self {
+        let Column { base, bytes } = blocks.layout.column(array);
+        Self { first: blocks.arena.at(base).cast(), count: bytes / size_of::<T>(), base }
+    }
+
+    /// The blocks that hold some elements.
+    #[inline(always)]
+    fn blocks(&self, elements: Range<usize>, shift: u32) -> Range<usize> {
+        let first = self.base + elements.start * size_of::<T>();
+        let end = self.base + elements.end * size_of::<T>();
+        first >> shift..((end - 1) >> shift) + 1
+    }
 }
 
 /// What unwinds through the kernels when a block cannot be read.
@@ -32,21 +65,22 @@ impl<'a> View<'a> {
     pub fn new(cached: &'a Cached) -> Self {
         let mut local = Local::take(&cached.blocks);
         local.begin();
-        Self { cached, local: Some(local), tick: cached.blocks.tick.load(Ordering::Relaxed) }
+        let blocks = &*cached.blocks;
+        Self {
+            cached,
+            words: &blocks.words,
+            nodes: Part::new(blocks, Array::Nodes),
+            references: Part::new(blocks, Array::References),
+            pages: Part::new(blocks, Array::Pages),
+            triangles: Part::new(blocks, Array::Triangles),
+            shift: blocks.layout.shift(),
+            tick: blocks.tick.load(Ordering::Relaxed),
+            local: Some(local),
+        }
     }
 
-    #[inline(always)]
     fn local(&self) -> &Local {
         self.local.as_ref().expect("it is there until the view is dropped")
-    }
-
-    /// The blocks that hold some elements of an array.
-    #[inline(always)]
-    fn blocks_of<T>(&self, array: Array, elements: Range<usize>) -> Range<usize> {
-        let layout = &self.cached.blocks.layout;
-        let base = layout.column(array).base;
-        let (first, end) = (base + elements.start * size_of::<T>(), base + elements.end * size_of::<T>());
-        first >> layout.shift()..((end - 1) >> layout.shift()) + 1
     }
 
     /// Uses blocks; whether all are here.
@@ -54,64 +88,65 @@ impl<'a> View<'a> {
     fn use_all(&self, blocks: Range<usize>) -> bool {
         let mut here = true;
         for block in blocks {
-            here &= self.cached.blocks.words.use_in(block, self.tick);
+            here &= self.words.use_in(block, self.tick);
         }
         here
     }
 
     /// Some elements of an array, whose blocks have been entered.
     #[inline(always)]
-    fn slice<T>(&self, array: Array, elements: Range<usize>) -> &[T] {
-        let column = self.cached.blocks.layout.column(array);
-        assert!(elements.start <= elements.end && elements.end * size_of::<T>() <= column.bytes);
-        let first = self.cached.blocks.arena.at(column.base).cast::<T>().wrapping_add(elements.start);
+    fn slice<T>(&self, part: &Part<T>, elements: Range<usize>) -> &[T] {
+        assert!(elements.start <= elements.end && elements.end <= part.count);
         // SAFETY: the elements are inside of the array, which begins at the start of a block and so is
         // aligned. They were here when their blocks were entered, this thread is still in that epoch, and
         // nobody writes to a block that is here. All of `T`'s values are plain numbers.
-        unsafe { std::slice::from_raw_parts(first, elements.len()) }
+        unsafe { std::slice::from_raw_parts(part.first.wrapping_add(elements.start), elements.len()) }
     }
 
     /// Has some elements of an array here.
     #[inline(always)]
-    fn enter_elements<T>(&self, array: Array, elements: Range<usize>) {
-        let blocks = self.blocks_of::<T>(array, elements);
-        self.local().looked_up(1);
+    fn enter_elements<T>(&self, part: &Part<T>, elements: Range<usize>) {
+        let blocks = part.blocks(elements, self.shift);
         if !self.use_all(blocks.clone()) {
-            let blocks: Vec<u32> = blocks.map(|block| block as u32).collect();
-            self.gather(&blocks);
+            self.gather_range(blocks);
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn gather_range(&self, blocks: Range<usize>) {
+        let blocks: Vec<u32> = blocks.map(|block| block as u32).collect();
+        self.gather(&blocks);
     }
 
     /// Has a list of primitives here, and their triangles.
     #[inline(always)]
-    fn enter_list(&self, array: Array, list: Range<usize>) {
+    fn enter_list(&self, part: &Part<u32>, list: Range<usize>) {
         if list.is_empty() {
             return;
         }
-        self.local().looked_up(1 + list.len() as u64);
-        let mut here = self.use_all(self.blocks_of::<u32>(array, list.clone()));
+        let mut here = self.use_all(part.blocks(list.clone(), self.shift));
         if here {
-            for &primitive in self.slice::<u32>(array, list.clone()) {
+            for &primitive in self.slice(part, list.clone()) {
                 let primitive = primitive as usize;
-                here &= self.use_all(self.blocks_of::<Triangle>(Array::Triangles, primitive..primitive + 1));
+                here &= self.use_all(self.triangles.blocks(primitive..primitive + 1, self.shift));
             }
         }
         if !here {
-            self.gather_list(array, list);
+            self.gather_list(part, list);
         }
     }
 
     /// The same, where something is missing.
     #[cold]
     #[inline(never)]
-    fn gather_list(&self, array: Array, list: Range<usize>) {
-        let mut blocks: Vec<u32> =
-            self.blocks_of::<u32>(array, list.clone()).map(|block| block as u32).collect();
+    fn gather_list(&self, part: &Part<u32>, list: Range<usize>) {
+        let mut blocks: Vec<u32> = part.blocks(list.clone(), self.shift).map(|block| block as u32).collect();
         self.gather(&blocks);
         // Together with the list, which may be given up when its triangles come.
-        for &primitive in self.slice::<u32>(array, list) {
+        for &primitive in self.slice(part, list) {
             let primitive = primitive as usize;
-            let triangle = self.blocks_of::<Triangle>(Array::Triangles, primitive..primitive + 1);
+            let triangle = self.triangles.blocks(primitive..primitive + 1, self.shift);
             blocks.extend(triangle.map(|block| block as u32));
         }
         blocks.sort_unstable();
@@ -140,8 +175,9 @@ impl<'a> View<'a> {
 
     /// Some bytes of the colours, entered and copied.
     pub fn color_bytes<const N: usize>(&self, first: usize) -> [u8; N] {
-        self.enter_elements::<u8>(Array::Colors, first..first + N);
-        *self.slice::<u8>(Array::Colors, first..first + N).first_chunk().expect("as many as asked for")
+        let colors: Part<u8> = Part::new(&self.cached.blocks, Array::Colors);
+        self.enter_elements(&colors, first..first + N);
+        *self.slice(&colors, first..first + N).first_chunk().expect("as many as asked for")
     }
 
     /// All that this thread has waited so far.
@@ -179,13 +215,13 @@ impl Tree for View<'_> {
     #[inline(always)]
     fn children(&self, inner: Node) -> [Node; 2] {
         let below = inner.below() as usize;
-        let pair = self.slice::<Node>(Array::Nodes, below..below + 2);
+        let pair = self.slice(&self.nodes, below..below + 2);
         [pair[0], pair[1]]
     }
 
     #[inline(always)]
     fn primitives(&self, leaf: Node) -> &[u32] {
-        self.slice(Array::References, leaf.references())
+        self.slice(&self.references, leaf.references())
     }
 
     #[inline(always)]
@@ -196,39 +232,39 @@ impl Tree for View<'_> {
     #[inline(always)]
     fn beneath(&self, place: usize) -> Node {
         let node = self.cached.beneath[place] as usize;
-        self.enter_elements::<Node>(Array::Nodes, node..node + 1);
-        self.slice::<Node>(Array::Nodes, node..node + 1)[0]
+        self.enter_elements(&self.nodes, node..node + 1);
+        self.slice(&self.nodes, node..node + 1)[0]
     }
 
     #[inline(always)]
     fn page(&self, leaf: Node) -> &[u32] {
-        self.slice(Array::Pages, leaf.references())
+        self.slice(&self.pages, leaf.references())
     }
 
     #[inline(always)]
     fn triangle(&self, primitive: u32) -> &Triangle {
         let primitive = primitive as usize;
-        &self.slice(Array::Triangles, primitive..primitive + 1)[0]
+        &self.slice(&self.triangles, primitive..primitive + 1)[0]
     }
 
     #[inline(always)]
     fn enter(&self, node: Node) {
         if node.is_leaf() {
-            self.enter_list(Array::References, node.references());
+            self.enter_list(&self.references, node.references());
         } else {
             let below = node.below() as usize;
-            self.enter_elements::<Node>(Array::Nodes, below..below + 2);
+            self.enter_elements(&self.nodes, below..below + 2);
         }
     }
 
     #[inline(always)]
     fn enter_page(&self, leaf: Node) {
-        self.enter_list(Array::Pages, leaf.references());
+        self.enter_list(&self.pages, leaf.references());
     }
 
     #[inline(always)]
     fn enter_triangle(&self, primitive: u32) {
         let primitive = primitive as usize;
-        self.enter_elements::<Triangle>(Array::Triangles, primitive..primitive + 1);
+        self.enter_elements(&self.triangles, primitive..primitive + 1);
     }
 }

@@ -11,7 +11,8 @@
 //! To see that a block is here is one load. A use writes only if the block was not used in this tick before.
 
 use super::policy::Use;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use crossbeam::utils::CachePadded;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 const HERE: u32 = 1 << 31;
@@ -26,13 +27,15 @@ pub struct Words {
     /// First uses in a tick, while they are noted down.
     trace: Mutex<Vec<u32>>,
     tracing: AtomicBool,
+    /// First uses in a tick.
+    uses: CachePadded<AtomicU64>,
 }
 
 impl Words {
     /// No block is here.
     pub fn new(blocks: usize) -> Self {
         let words = (0..blocks).map(|_| AtomicU32::new(0)).collect();
-        Self { words, trace: Mutex::default(), tracing: AtomicBool::new(false) }
+        Self { words, trace: Mutex::default(), tracing: AtomicBool::new(false), uses: CachePadded::default() }
     }
 
     /// Memory of so many.
@@ -69,9 +72,15 @@ impl Words {
     }
 
     fn note(&self, block: usize) {
+        self.uses.fetch_add(1, Ordering::Relaxed);
         if self.tracing.load(Ordering::Relaxed) {
             self.trace.lock().unwrap_or_else(PoisonError::into_inner).push(block as u32);
         }
+    }
+
+    /// First uses in a tick since the last call.
+    pub fn take_uses(&self) -> u64 {
+        self.uses.swap(0, Ordering::Relaxed)
     }
 
     /// Notes first uses in a tick down from now on, or no longer does.

@@ -86,7 +86,7 @@ pub struct CacheReport {
     pub data: usize,
     /// How blocks were held.
     pub options: CacheOptions,
-    /// The share of look-ups that found their block.
+    /// The share of uses that did not wait for their block.
     pub hit_ratio: f64,
     /// What the cache did.
     #[serde(flatten)]
@@ -123,7 +123,7 @@ impl CacheReport {
         lines.add(
             "",
             format!(
-                "{:.3} % of look-ups hit, {} blocks ({}) read, threads waited {stalled:.2} s",
+                "{:.2} % of uses hit, {} blocks ({}) read, threads waited {stalled:.2} s",
                 self.hit_ratio * 100.0,
                 grouped(loads),
                 bytes(bytes_read),

@@ -39,10 +39,9 @@ impl<'a, S: Surface> Shader<'a, S> {
             let (base, depth) = (self.sky(ray.direction), f32::INFINITY);
             return Shade { base, key: Vec3::ZERO, shadow: None, depth, normal: Vec3::ZERO };
         }
-        let corners = self.surface.corners(hit.primitive);
+        let (corners, color) = self.surface.look(hit.primitive, hit.u, hit.v);
         let normal = unit_normal(hit.normal, corners);
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        let color = self.surface.color(hit.primitive, hit.u, hit.v);
         let mut shade = Shade {
             base: color * self.lighting.ambient.irradiance(normal),
             key: Vec3::ZERO,

@@ -1,6 +1,6 @@
 //! What shading asks of the triangles that rays hit.
 
-use crate::cache::Cached;
+use crate::cache::{Cached, View};
 use crate::kdtree::Tree;
 use crate::mesh::{Mesh, decode};
 use crate::store::{self, ColorMeta, Stored};
@@ -18,6 +18,12 @@ pub trait Surface: Sync {
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3;
     /// The index of a triangle's material; 0 in scenes that have none.
     fn material(&self, primitive: u32) -> u32;
+
+    /// Corners and reflectance at once.
+    #[inline(always)]
+    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
+        (self.corners(primitive), self.color(primitive, u, v))
+    }
 }
 
 /// The surfaces of a scene that is not all in memory.
@@ -55,10 +61,9 @@ impl CachedSurface {
     }
 }
 
-impl Surface for CachedSurface {
+impl CachedSurface {
     #[inline]
-    fn corners(&self, primitive: u32) -> [Vec3; 3] {
-        let view = self.cached.view();
+    fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
         view.enter_triangle(primitive);
         let corners = view.corners(primitive);
         let scale = self.cached.scale();
@@ -66,29 +71,47 @@ impl Surface for CachedSurface {
     }
 
     #[inline]
-    fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
+    fn color_in(&self, view: &View<'_>, primitive: u32, u: f32, v: f32) -> Vec3 {
         let at = |bytes: usize| primitive as usize * bytes;
         match &self.paint {
             CachedPaint::Uniform(color) => *color,
-            CachedPaint::PerTriangle => decode(self.cached.view().color_bytes::<3>(at(3))),
+            CachedPaint::PerTriangle => decode(view.color_bytes::<3>(at(3))),
             CachedPaint::PerCorner => {
-                let bytes = self.cached.view().color_bytes::<9>(at(9));
-                let [a, b, c, d, e, f, g, h, i] = bytes;
+                let [a, b, c, d, e, f, g, h, i] = view.color_bytes::<9>(at(9));
                 let [c0, c1, c2] = [[a, b, c], [d, e, f], [g, h, i]].map(decode);
                 (1.0 - u - v) * c0 + u * c1 + v * c2
             }
-            CachedPaint::PerMaterial(diffuse) => diffuse[self.material(primitive) as usize % diffuse.len()],
+            CachedPaint::PerMaterial(diffuse) => {
+                diffuse[material_in(view, primitive) as usize % diffuse.len()]
+            }
+        }
+    }
+}
+
+fn material_in(view: &View<'_>, primitive: u32) -> u32 {
+    u32::from_le_bytes(view.color_bytes(primitive as usize * 4))
+}
+
+impl Surface for CachedSurface {
+    fn corners(&self, primitive: u32) -> [Vec3; 3] {
+        self.corners_in(&self.cached.view(), primitive)
+    }
+
+    fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
+        self.color_in(&self.cached.view(), primitive, u, v)
+    }
+
+    fn material(&self, primitive: u32) -> u32 {
+        match &self.paint {
+            CachedPaint::PerMaterial(_) => material_in(&self.cached.view(), primitive),
+            _ => 0,
         }
     }
 
     #[inline]
-    fn material(&self, primitive: u32) -> u32 {
-        match &self.paint {
-            CachedPaint::PerMaterial(_) => {
-                u32::from_le_bytes(self.cached.view().color_bytes(primitive as usize * 4))
-            }
-            _ => 0,
-        }
+    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
+        let view = self.cached.view();
+        (self.corners_in(&view, primitive), self.color_in(&view, primitive, u, v))
     }
 }
 

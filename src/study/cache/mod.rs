@@ -120,7 +120,7 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
             let frames = flight.fly(&renderer, Some(&cached))?;
             let uses = cached.take_uses();
             let minimum = minimum::misses(&uses, cached.plan().held(), warm);
-            rows.push(Row::cached(&trial, warm, memory, &cached, frames, [uses.len() as u64, minimum]));
+            rows.push(Row::cached(&trial, warm, memory, &cached, frames, minimum));
             step();
         }
     }

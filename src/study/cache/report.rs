@@ -42,7 +42,7 @@ pub struct Row {
     pub rays_per_s: f64,
     /// The slowest and the fastest frame in seconds.
     pub frame_seconds: [f64; 2],
-    /// The share of look-ups that found their block.
+    /// The share of uses that did not wait for their block.
     pub hit_ratio: f64,
     /// Uses of blocks, counted once for each tile.
     pub uses: u64,
@@ -71,8 +71,8 @@ impl Row {
     pub fn resident(frames: Vec<FrameRow>) -> Self {
         let seconds: f64 = frames.iter().map(|frame| frame.seconds).sum();
         let sum = |of: fn(&CacheStats) -> u64| frames.iter().map(|frame| of(&frame.cache)).sum::<u64>();
-        let (lookups, misses) = (sum(|c| c.lookups), sum(|c| c.misses));
-        let all = CacheStats { lookups, misses, ..CacheStats::default() };
+        let (uses, misses) = (sum(|c| c.uses), sum(|c| c.misses));
+        let all = CacheStats { uses, misses, ..CacheStats::default() };
         let middle = |of: fn(&FrameRow) -> f64| {
             let mut times: Vec<f64> = frames.iter().map(of).collect();
             times.sort_by(f64::total_cmp);
@@ -90,7 +90,7 @@ impl Row {
             rays_per_s: rays as f64 / seconds,
             frame_seconds: [extreme(f64::max, 0.0), extreme(f64::min, f64::INFINITY)],
             hit_ratio: all.hit_ratio(),
-            uses: 0,
+            uses,
             loads: sum(|c| c.loads),
             minimum: 0,
             held: 0,
@@ -110,7 +110,7 @@ impl Row {
         memory_bytes: usize,
         cached: &Cached,
         frames: Vec<FrameRow>,
-        [uses, minimum]: [u64; 2],
+        minimum: u64,
     ) -> Self {
         let seconds: f64 = frames.iter().map(|frame| frame.seconds).sum();
         let loading: f64 = frames.iter().map(|frame| frame.cache.loading).sum();
@@ -125,7 +125,6 @@ impl Row {
             loading: Some(trial.options.loading),
             cache: Some(trial.options),
             warm,
-            uses,
             minimum,
             held: cached.plan().held(),
             loader_idle,
