@@ -60,6 +60,7 @@
 //! Every kernel on every instruction set gives the same answer, to the bit.
 
 pub mod batch;
+pub mod cache;
 pub mod column;
 pub mod error;
 pub mod files;

@@ -1,16 +1,11 @@
 //! The command line from end to end: what it prints, what it writes, and how it fails.
 
-use assert_cmd::Command;
+mod common;
+
+use common::Place;
 use predicates::prelude::*;
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
-
-/// A folder to run in, with a model.
-struct Place {
-    folder: TempDir,
-}
 
 /// A roof of two slopes over a floor, with a colour for each face.
 const HOUSE: &str = "ply
@@ -38,65 +33,15 @@ end_header
 3 4 7 6 60 90 200
 ";
 
-impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a folder");
-        fs::write(folder.path().join("house.ply"), HOUSE).expect("written");
-        Self { folder }
-    }
+/// A folder to run in, with a model.
+fn house() -> Place {
+    let place = Place::new();
+    place.write("house.ply", HOUSE);
+    place
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: impl AsRef<[u8]>) {
-        fs::write(self.path(name), text).expect("written");
-    }
-
-    fn raypack(&self, arguments: &str) -> Command {
-        let mut command = Command::cargo_bin("raypack").expect("it was built");
-        command.current_dir(self.folder.path()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
-        command
-    }
-
-    /// Runs it to success and returns what it printed.
-    fn succeed(&self, arguments: &str) -> String {
-        let output = self.raypack(arguments).assert().success().get_output().clone();
-        assert_eq!(String::from_utf8_lossy(&output.stderr), "", "{arguments}");
-        String::from_utf8(output.stdout).expect("text")
-    }
-
-    /// Runs it to failure: exit code 1, nothing on standard output, one line on standard error
-    /// that holds all of `expected`, and no file that was not there before.
-    fn fail(&self, arguments: &str, expected: &[&str]) {
-        self.fail_with(self.raypack(arguments), arguments, expected);
-    }
-
-    fn fail_with(&self, mut command: Command, what: &str, expected: &[&str]) {
-        let before = self.files();
-        let output = command.assert().code(1).stdout("").get_output().clone();
-        let message = String::from_utf8(output.stderr).expect("text");
-        assert!(message.starts_with("raypack: error: "), "{what}: {message}");
-        assert_eq!(message.matches('\n').count(), 1, "{what}: {message}");
-        for part in expected {
-            assert!(message.contains(part), "{what}: \"{part}\" is not in: {message}");
-        }
-        assert_eq!(self.files(), before, "{what} left something behind");
-    }
-
-    /// The files and folders here.
-    fn files(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("a folder");
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
-            .collect();
-        names.sort();
-        names
-    }
-
-    fn dimensions(&self, name: &str) -> (u32, u32) {
-        image::image_dimensions(self.path(name)).expect("a picture")
-    }
+fn dimensions(place: &Place, name: &str) -> (u32, u32) {
+    image::image_dimensions(place.path(name)).expect("a picture")
 }
 
 fn json(text: &str) -> Value {
@@ -105,9 +50,9 @@ fn json(text: &str) -> Value {
 
 #[test]
 fn render_writes_the_picture_and_says_what_it_did() {
-    let place = Place::new();
+    let place = house();
     let text = place.succeed("render house.ply -o out.png --size 40x30 --threads 2");
-    assert_eq!(place.dimensions("out.png"), (40, 30));
+    assert_eq!(dimensions(&place, "out.png"), (40, 30));
     for expected in [
         "house.ply",
         "triangles  4 ",
@@ -126,15 +71,15 @@ fn render_writes_the_picture_and_says_what_it_did() {
 
 #[test]
 fn the_demo_scene_needs_no_arguments() {
-    let place = Place::new();
+    let place = house();
     let report = json(&place.succeed("render -o plant.png --size 64x36 --json -"));
     assert!(report["triangles"].as_u64().expect("a number") >= 250_000);
-    assert_eq!(place.dimensions("plant.png"), (64, 36));
+    assert_eq!(dimensions(&place, "plant.png"), (64, 36));
 }
 
 #[test]
 fn json_on_standard_output_stands_alone() {
-    let place = Place::new();
+    let place = house();
     let report = json(
         &place.succeed("render house.ply -o out.pfm --size 8x8 --samples 2 --packet 4 --tile 3 --json -"),
     );
@@ -152,7 +97,7 @@ fn json_on_standard_output_stands_alone() {
 
 #[test]
 fn every_tuning_gives_the_same_file() {
-    let place = Place::new();
+    let place = house();
     place.succeed("render house.ply -o a.exr --size 33x21 --threads 1 --packet 1 --tile 1024");
     let expected = fs::read(place.path("a.exr")).expect("written");
     for tuning in ["--threads 3 --packet 4 --tile 5", "--threads 0 --packet 8", "--pin --packet 16 --tile 1"]
@@ -167,7 +112,7 @@ fn every_tuning_gives_the_same_file() {
 
 #[test]
 fn every_accuracy_renders_and_is_reported() {
-    let place = Place::new();
+    let place = house();
     for accuracy in ["fast", "watertight", "exact"] {
         let arguments = format!("render house.ply -o {accuracy}.png --size 40x30 --accuracy {accuracy}");
         let text = place.succeed(&arguments);
@@ -181,7 +126,7 @@ fn every_accuracy_renders_and_is_reported() {
 
 #[test]
 fn depth_and_normals_come_on_request() {
-    let place = Place::new();
+    let place = house();
     let camera = "--camera eye=0,5,0;at=0,0,0;fov=20";
     place.succeed(&format!("render house.ply -o c.png {camera} --size 5x5 --depth d.exr --normals n.exr"));
     let middle = |name| image::open(place.path(name)).expect("a picture").to_rgb32f().get_pixel(2, 2).0;
@@ -193,7 +138,7 @@ fn depth_and_normals_come_on_request() {
 
 #[test]
 fn an_orbit_is_a_numbered_row_of_pictures() {
-    let place = Place::new();
+    let place = house();
     let text = place.succeed("render house.ply -o o.png --size 12x12 --orbit 3 --step 30 --depth o.pfm");
     assert_eq!(
         place.files(),
@@ -206,15 +151,15 @@ fn an_orbit_is_a_numbered_row_of_pictures() {
 
 #[test]
 fn an_old_picture_is_replaced() {
-    let place = Place::new();
+    let place = house();
     place.write("out.png", "something old");
     place.succeed("render house.ply -o out.png --size 4x4");
-    assert_eq!(place.dimensions("out.png"), (4, 4));
+    assert_eq!(dimensions(&place, "out.png"), (4, 4));
 }
 
 #[test]
 fn a_camera_may_be_a_file() {
-    let place = Place::new();
+    let place = house();
     place.write("camera.toml", "eye = [4, 3, 2]\nat = [0, 1, 0]\nfov = 50\n");
     place.succeed("render house.ply -o a.png --size 16x16 --camera camera.toml");
     place.succeed("render house.ply -o b.png --size 16x16 --camera eye=4,3,2;at=0,1,0;fov=50");
@@ -223,7 +168,7 @@ fn a_camera_may_be_a_file() {
 
 #[test]
 fn info_says_what_is_in_a_model() {
-    let place = Place::new();
+    let place = house();
     let text = place.succeed("info house.ply --validate");
     for expected in
         ["triangles  4 with 8 vertices", "bounds", "-3,0,-3 to 3,2,3", "per triangle", "memory", "valid "]
@@ -238,7 +183,7 @@ fn info_says_what_is_in_a_model() {
 
 #[test]
 fn materials_of_an_obj_are_listed() {
-    let place = Place::new();
+    let place = house();
     place.write("m.mtl", "newmtl brick\nKd 0.5 0.1 0.1\nnewmtl spare\nKd 1 1 1\n");
     place.write("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl brick\nf 1 2 3\n");
     let text = place.succeed("info m.obj");
@@ -248,7 +193,7 @@ fn materials_of_an_obj_are_listed() {
 
 #[test]
 fn a_generated_plant_comes_back() {
-    let place = Place::new();
+    let place = house();
     place.succeed("generate plant --triangles 12k --seed 3 -o plant.ply");
     let report = json(&place.succeed("info plant.ply --json -"));
     let triangles = report["triangles"].as_f64().expect("a number");
@@ -257,7 +202,7 @@ fn a_generated_plant_comes_back() {
 
 #[test]
 fn a_profile_sets_what_the_options_leave_open() {
-    let place = Place::new();
+    let place = house();
     fs::create_dir(place.path("profiles")).expect("created");
     place.write("profiles/mine.toml", "[render]\npacket = 4\ntile = 8\nthreads = 3\n");
     let report =
@@ -273,9 +218,9 @@ fn a_profile_sets_what_the_options_leave_open() {
 #[cfg(unix)]
 fn a_closed_pipe_is_no_failure() {
     use std::process::{Command, Stdio};
-    let place = Place::new();
+    let place = house();
     let mut child = Command::new(assert_cmd::cargo::cargo_bin("raypack"))
-        .current_dir(place.folder.path())
+        .current_dir(place.folder())
         .args(["info", "house.ply"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -289,7 +234,7 @@ fn a_closed_pipe_is_no_failure() {
 
 #[test]
 fn a_command_line_without_sense_is_a_usage_error() {
-    let place = Place::new();
+    let place = house();
     for arguments in [
         "",
         "rander house.ply",
@@ -318,26 +263,26 @@ mod bad_input {
 
     #[test]
     fn missing_file() {
-        refused(&Place::new(), "nowhere.ply", &["cannot read nowhere.ply"]);
+        refused(&house(), "nowhere.ply", &["cannot read nowhere.ply"]);
     }
 
     #[test]
     fn wrong_ending() {
-        let place = Place::new();
+        let place = house();
         place.write("model.txt", HOUSE);
         refused(&place, "model.txt", &["model.txt", "(.txt)", ".obj", ".ply"]);
     }
 
     #[test]
     fn a_folder_is_no_model() {
-        let place = Place::new();
+        let place = house();
         fs::create_dir(place.path("folder.ply")).expect("created");
         refused(&place, "folder.ply", &["cannot read folder.ply"]);
     }
 
     #[test]
     fn truncated_ply() {
-        let place = Place::new();
+        let place = house();
         for length in [HOUSE.len() - 40, HOUSE.len() / 2, 30, 0] {
             place.write("cut.ply", &HOUSE[..length]);
             refused(&place, "cut.ply", &["cut.ply: "]);
@@ -346,7 +291,7 @@ mod bad_input {
 
     #[test]
     fn index_out_of_range() {
-        let place = Place::new();
+        let place = house();
         place.write("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 9\n");
         refused(&place, "far.obj", &["far.obj: ", "9"]);
         place.write("far.ply", HOUSE.replace("3 4 7 6 60", "3 4 8 6 60"));
@@ -355,7 +300,7 @@ mod bad_input {
 
     #[test]
     fn vertices_that_are_not_finite() {
-        let place = Place::new();
+        let place = house();
         for bad in ["nan", "inf", "-inf", "1e39"] {
             place.write("bad.ply", HOUSE.replace("0 2 1\n", &format!("0 {bad} 1\n")));
             refused(&place, "bad.ply", &["bad.ply: "]);
@@ -366,7 +311,7 @@ mod bad_input {
 
     #[test]
     fn no_triangles() {
-        let place = Place::new();
+        let place = house();
         place.write("points.obj", "v 0 0 0\nv 1 0 0\n");
         refused(&place, "points.obj", &["points.obj: ", "no triangles"]);
         place.write("empty.obj", "");
@@ -375,7 +320,7 @@ mod bad_input {
 
     #[test]
     fn output_that_cannot_be_written() {
-        let place = Place::new();
+        let place = house();
         fs::create_dir(place.path("folder.png")).expect("created");
         for (output, expected) in [("no/such/out.png", "no/such/out.png"), ("folder.png", "folder.png")] {
             place.fail(&format!("render house.ply -o {output}"), &["cannot write", expected]);
@@ -388,7 +333,7 @@ mod bad_input {
 
     #[test]
     fn output_of_an_unknown_kind() {
-        let place = Place::new();
+        let place = house();
         for output in ["out.jpg", "out", "out."] {
             place.fail(&format!("render house.ply -o {output}"), &[output, ".png, .exr or .pfm"]);
         }
@@ -398,7 +343,7 @@ mod bad_input {
 
     #[test]
     fn outputs_that_would_overwrite_one_another() {
-        let place = Place::new();
+        let place = house();
         place.fail("render house.ply -o a.png --depth a.png", &["a.png is named twice"]);
         place.fail("render house.ply -o a.png --json a.png", &["a.png is named twice"]);
         place.fail("generate plant -o a.ply --json a.ply", &["--json"]);
@@ -406,7 +351,7 @@ mod bad_input {
 
     #[test]
     fn zero_or_absurd_sizes() {
-        let place = Place::new();
+        let place = house();
         for size in ["0x8", "8x0", "40000x8", "99999999999999999999x8", "32768x32768", "8", "-8x8", "axb"] {
             place.fail(&format!("render house.ply -o a.png --size {size}"), &["--size", size]);
         }
@@ -414,7 +359,7 @@ mod bad_input {
 
     #[test]
     fn options_without_sense() {
-        let place = Place::new();
+        let place = house();
         for (option, expected) in [
             ("--samples 0", "--samples: 0"),
             ("--tile 0", "--tile: 0"),
@@ -441,7 +386,7 @@ mod bad_input {
 
     #[test]
     fn profiles_without_sense() {
-        let place = Place::new();
+        let place = house();
         for (text, expected) in [
             ("[render]\ntyle = 3\n", "p.toml: line 2: unknown field `tyle`"),
             ("[render]\ntile = 0\n", "p.toml: render.tile: 0"),
@@ -457,12 +402,12 @@ mod bad_input {
     #[test]
     fn nothing_is_read_before_the_options_are_checked() {
         // The model does not exist, but it is the output that is complained about.
-        Place::new().fail("render nowhere.ply -o a.jpg", &["a.jpg"]);
+        house().fail("render nowhere.ply -o a.jpg", &["a.jpg"]);
     }
 
     #[test]
     fn what_was_there_before_stays() {
-        let place = Place::new();
+        let place = house();
         place.write("out.png", "precious");
         place.fail("render nowhere.ply -o out.png", &["nowhere.ply"]);
         assert_eq!(fs::read_to_string(place.path("out.png")).expect("there"), "precious");
@@ -470,7 +415,7 @@ mod bad_input {
 
     #[test]
     fn a_broken_file_is_never_half_a_model() {
-        let place = Place::new();
+        let place = house();
         place.write("bad.ply", HOUSE.replace("format ascii 1.0", "format binary_little_endian 1.0"));
         refused(&place, "bad.ply", &["bad.ply: "]);
     }

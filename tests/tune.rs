@@ -1,40 +1,22 @@
 //! `raypack tune` and what a tuner looks at, from end to end.
 
-use assert_cmd::Command;
+mod common;
+
+use common::Place;
 use predicates::prelude::*;
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
 
 /// A folder with a small plant in it.
-struct Place(TempDir);
-
-impl Place {
-    fn new() -> Self {
-        let place = Self(tempfile::tempdir().expect("a folder"));
-        place.raypack("generate plant --triangles 10k -o plant.ply").assert().success();
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn raypack(&self, arguments: &str) -> Command {
-        let mut command = Command::cargo_bin("raypack").expect("it was built");
-        command.current_dir(self.0.path()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
-        command
-    }
-
-    fn json(&self, name: &str) -> Value {
-        serde_json::from_str(&fs::read_to_string(self.path(name)).expect("written")).expect("JSON")
-    }
+fn plant() -> Place {
+    let place = Place::new();
+    place.succeed("generate plant --triangles 10k -o plant.ply");
+    place
 }
 
 #[test]
 fn a_search_writes_a_profile_that_render_takes() {
-    let place = Place::new();
+    let place = plant();
     place
         .raypack("tune plant.ply -o mine.toml --minutes 0.1 --size 48x48 --rays frame,ao --json r.json --plot p.svg")
         .assert()
@@ -77,9 +59,9 @@ fn a_search_writes_a_profile_that_render_takes() {
 #[test]
 fn an_interrupted_search_writes_the_best_so_far() {
     use std::time::{Duration, Instant};
-    let place = Place::new();
+    let place = plant();
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
-    command.current_dir(place.0.path()).args(["tune", "plant.ply", "-o", "mine.toml", "--size", "48x48"]);
+    command.current_dir(place.folder()).args(["tune", "plant.ply", "-o", "mine.toml", "--size", "48x48"]);
     command.args(["--minutes", "60", "--json", "r.json"]).stdout(std::process::Stdio::null());
     let mut child = command.spawn().expect("it runs");
     // The handler is there once the model has been read; then an interrupt ends the search, not the process.
@@ -101,18 +83,14 @@ fn an_interrupted_search_writes_the_best_so_far() {
 
 #[test]
 fn a_cap_on_memory_is_kept() {
-    let place = Place::new();
-    place
-        .raypack("tune plant.ply -o mine.toml --minutes 0.1 --size 32x32 --memory 64KiB")
-        .assert()
-        .failure()
-        .stderr(predicate::str::contains("--memory: the model takes"));
-    assert!(!place.path("mine.toml").exists());
+    let place = plant();
+    let little = "tune plant.ply -o mine.toml --minutes 0.1 --size 32x32 --memory 64KiB";
+    place.fail(little, &["--memory: the model takes"]);
 }
 
 #[test]
 fn bad_options_are_one_line_and_leave_nothing() {
-    let place = Place::new();
+    let place = plant();
     for (options, expected) in [
         ("-o mine.txt", "mine.txt: unknown kind of file"),
         ("-o no/such/folder/mine.toml", "cannot write no/such/folder/mine.toml"),
@@ -127,16 +105,13 @@ fn bad_options_are_one_line_and_leave_nothing() {
         ("-o mine.toml --json mine.toml", "--json: this file is named twice"),
         ("-o mine.toml --profile nonsense", "profiles/nonsense.toml"),
     ] {
-        let run = place.raypack(&format!("tune plant.ply {options}")).assert().failure();
-        let message = String::from_utf8(run.get_output().stderr.clone()).expect("text");
-        assert!(message.contains(expected) && message.lines().count() == 1, "{options}: {message}");
-        assert!(!place.path("mine.toml").exists(), "{options}");
+        place.fail(&format!("tune plant.ply {options}"), &[expected]);
     }
 }
 
 #[test]
 fn heat_maps_are_pictures_of_costs() {
-    let place = Place::new();
+    let place = plant();
     for cost in ["steps", "tests", "leaves", "time"] {
         place
             .raypack(&format!(
@@ -159,18 +134,14 @@ fn heat_maps_are_pictures_of_costs() {
     let picture = image::open(place.path("heat.png")).expect("a picture").to_rgb8();
     assert_eq!(picture.dimensions(), (40, 30));
     assert!(picture.pixels().any(|pixel| pixel != picture.get_pixel(0, 0)), "it shows something");
-    place
-        .raypack("render plant.ply -o heat.png --heatmap warmth")
-        .assert()
-        .failure()
-        .stderr(predicate::str::contains("--heatmap: \"warmth\" is not one of steps"));
+    let unknown = "render plant.ply -o heat.png --heatmap warmth";
+    place.fail(unknown, &["--heatmap: \"warmth\" is not one of steps"]);
 }
 
 #[test]
 fn info_draws_what_a_tuner_looks_at() {
-    let place = Place::new();
-    let drawn = place.raypack("info plant.ply --json i.json").assert().success();
-    let text = String::from_utf8(drawn.get_output().stdout.clone()).expect("text");
+    let place = plant();
+    let text = place.succeed("info plant.ply --json i.json");
     for title in ["leaf size", "depth", "in leaves", "area", "aspect"] {
         assert!(text.lines().any(|line| line.starts_with(title)), "{title}: {text}");
     }
@@ -179,6 +150,7 @@ fn info_draws_what_a_tuner_looks_at() {
     let sum =
         |list: &Value| -> u64 { list.as_array().expect("a list").iter().filter_map(Value::as_u64).sum() };
     assert_eq!(Some(sum(&report["tree"]["depth_histogram"])), report["tree"]["leaves"].as_u64());
+    assert!(sum(&report["tree"]["duplication_histogram"]) > 0, "triangles are in leaves");
     let without_area = report["shapes"]["without_area"].as_u64().expect("a number");
     assert_eq!(Some(sum(&report["shapes"]["by_area"]) + without_area), report["triangles"].as_u64());
     assert!(report["random_rays"]["tests"].as_f64() > Some(0.0));

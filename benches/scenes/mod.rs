@@ -69,7 +69,7 @@ fn models(folder: &Path) -> Vec<Scene> {
 pub fn quick() -> criterion::Criterion {
     // Criterion's plots are drawn by the same plotters, which has the fonts that it is given.
     #[cfg(feature = "accuracy")]
-    raypack::study::accuracy::tradeoff::plot::register_font();
+    raypack::study::plot::register_font();
     use std::time::Duration;
     criterion::Criterion::default()
         .sample_size(10)

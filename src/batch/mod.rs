@@ -43,7 +43,7 @@ mod choice;
 pub mod numpy;
 
 use crate::geometry::{Hit, Ray};
-use crate::render::Workers;
+use crate::render::{Sharing, Workers};
 use crate::traverse::{Accel, Kernel};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -123,7 +123,7 @@ impl<'a> Batch<'a> {
         };
         let kernel = self.kernel.unwrap_or_else(|| choice::quickest(self.rays, none, &call));
         let jobs: Vec<_> = self.rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)).collect();
-        let outcome = Workers { threads: threads.min(jobs.len()), pin: false }.run(
+        let outcome = Workers { threads: threads.min(jobs.len()), pin: false, sharing: Sharing::Runs }.run(
             jobs,
             || (),
             |(), (rays, answers): (&[Ray], &mut [A])| {

@@ -11,6 +11,7 @@ use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::study::accuracy::tradeoff::{Options, plot, run as study};
 use crate::study::bench::{EngineName, Pace};
+use crate::study::plot::Format;
 use crate::study::rays::RayKind;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -153,7 +154,7 @@ fn options(args: &Args) -> Result<Options> {
 }
 
 fn check_plot(file: &Path, json: Option<&Path>) -> Result<()> {
-    plot::Format::of(file)?;
+    Format::of(file)?;
     if json.is_some_and(|json| same_file(file, json)) {
         return Err(Error::option("--plot", "this is the report's file too; give another name"));
     }

@@ -98,7 +98,7 @@ struct Report<'a> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = args.build.profile_for(Some(&args.scene))?;
+    let profile = args.build.profile_for(Some(&args.scene), false)?;
     let accuracy = args.accuracy.mode()?;
     let kernel = args.kernel()?;
     let threads = args.threads(&profile)?;
@@ -170,18 +170,19 @@ impl Args {
         let tracing = || batch.fraction();
         if self.any {
             let mut occluded = vec![false; rays.len()];
-            let traced = watch("tracing", tracing, || batch.occluded(&mut occluded));
+            let traced = scene.reading(|| watch("tracing", tracing, || batch.occluded(&mut occluded)))?;
             let writing = Instant::now();
             write_occluded(&self.output, &occluded)?;
             let hits = occluded.iter().filter(|&&any| any).count() as u64;
             Ok((traced, hits, writing.elapsed().as_secs_f64()))
         } else {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let traced = watch("tracing", tracing, || batch.intersect(&mut hits));
+            let traced = scene.reading(|| watch("tracing", tracing, || batch.intersect(&mut hits)))?;
             let writing = Instant::now();
             match &scene.looks {
                 Looks::Mesh(mesh) => write_hits(&self.output, &hits, mesh)?,
                 Looks::Stored(stored) => write_hits(&self.output, &hits, stored)?,
+                Looks::Cached(cached) => scene.reading(|| write_hits(&self.output, &hits, cached))??,
             }
             let count = hits.iter().filter(|hit| hit.is_hit()).count() as u64;
             Ok((traced, count, writing.elapsed().as_secs_f64()))

@@ -82,7 +82,7 @@ struct Memory {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = args.build.profile_for(Some(&args.model))?;
+    let profile = args.build.profile_for(Some(&args.model), false)?;
     args.json.check()?;
     let file = file::open(&args.model, args.verify)?;
     let (scene, copy) = match &file {
@@ -94,9 +94,10 @@ pub fn run(args: &Args) -> Result<()> {
         let fault = |fault| Error::malformed(&args.model, format!("its tree is broken: {fault}"));
         scene.accel.tree().validate().map_err(fault)?;
     }
+    let duplication = scene.accel.tree().duplication();
     let report = Report {
         engine: ENGINE,
-        scene: scene.report(),
+        scene: scene.report().with_duplication(&duplication),
         colors: colors(mesh),
         file: file.as_ref().map(|file| FileReport::new(file, args.verify)),
         memory: memory(mesh, &scene.tree),
@@ -104,7 +105,7 @@ pub fn run(args: &Args) -> Result<()> {
         random_rays: random_rays(&scene, mesh),
         validated: args.validate,
     };
-    args.json.give(&text(&scene, &report), &report)
+    args.json.give(&text(&scene, &report, &duplication), &report)
 }
 
 /// Random rays are as many as a square image of this side has pixels.
@@ -155,7 +156,7 @@ fn memory(mesh: &Mesh, tree: &TreeStats) -> Memory {
     memory
 }
 
-fn text(scene: &Scene, report: &Report<'_>) -> String {
+fn text(scene: &Scene, report: &Report<'_>, duplication: &[usize]) -> String {
     let mut lines = Lines::default();
     scene.describe(&mut lines);
     let tree = &scene.tree;
@@ -187,7 +188,7 @@ fn text(scene: &Scene, report: &Report<'_>) -> String {
     let numbered = |first: usize| move |i: usize| (i + first).to_string();
     bars(&mut lines, "leaf size", "leaves", &tree.leaf_histogram, numbered(0));
     bars(&mut lines, "depth", "leaves", &tree.depth_histogram, numbered(0));
-    bars(&mut lines, "in leaves", "triangles", &tree.duplication_histogram, numbered(1));
+    bars(&mut lines, "in leaves", "triangles", duplication, numbered(1));
     let shapes = &report.shapes;
     let [by_area, by_aspect] =
         [shapes.by_area, shapes.by_aspect].map(|counts| counts.map(|count| count as usize));

@@ -6,6 +6,8 @@
 mod accuracy;
 mod bench;
 mod build;
+mod cache;
+mod cache_options;
 mod cast;
 mod generate;
 mod histogram;
@@ -42,6 +44,7 @@ enum Command {
     Info(info::Args),
     Bench(bench::Args),
     Accuracy(accuracy::Args),
+    Cache(cache::Args),
     Cast(cast::Args),
     Generate(generate::Args),
     Tune(tune::Args),
@@ -57,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Accuracy(args) => accuracy::run(args),
+        Command::Cache(args) => cache::run(args),
         Command::Cast(args) => cast::run(args),
         Command::Generate(args) => generate::run(args),
         Command::Tune(args) => tune::run(args),

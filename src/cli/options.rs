@@ -41,7 +41,8 @@ pub struct BuildOptions {
     #[arg(long, value_name = "preview|standard|best")]
     preset: Option<String>,
     /// The memory that model and build may take, as 512MiB or 2GiB: the tree is made coarser to fit, and
-    /// where that does not do, it is refused before the build starts [default: no limit]
+    /// where that does not do, it is refused before the build starts. Of a scene file, render holds as much as
+    /// fits and reads the rest when it is needed [default: no limit]
     #[arg(long, value_name = "SIZE")]
     memory: Option<String>,
 }
@@ -65,14 +66,16 @@ impl BuildOptions {
         Ok(profile)
     }
 
-    /// The same for a scene, whose tree may be built already.
+    /// The same for a scene, whose tree may be built already; `--memory` then says how much of it is held, for
+    /// a command that can do with a part.
     ///
     /// # Errors
     /// Likewise, or an option would have another tree built of a scene file.
-    pub fn profile_for(&self, scene: Option<&Path>) -> Result<Profile> {
+    pub fn profile_for(&self, scene: Option<&Path>, a_part_will_do: bool) -> Result<Profile> {
         let profile = self.profile()?;
         let Some(file) = scene.filter(|scene| is_scene(scene)) else { return Ok(profile) };
-        let given = [("--preset", self.preset.is_some()), ("--memory", self.memory.is_some())];
+        let given =
+            [("--preset", self.preset.is_some()), ("--memory", self.memory.is_some() && !a_part_will_do)];
         match given.into_iter().find(|(_, given)| *given) {
             Some((option, _)) => {
                 let message = format!(

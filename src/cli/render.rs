@@ -3,6 +3,7 @@
 mod heat;
 mod report;
 
+use super::cache_options::{CacheArgs, CacheReport};
 use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::Outputs;
@@ -10,15 +11,17 @@ use super::progress::watch;
 use super::report::Json;
 use super::scene::{Looks, Scene};
 use crate::error::{Error, Result};
+use crate::geometry::Accuracy;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
 use crate::render::{RenderSettings, Renderer, Size, Tuning};
 use crate::scene::{Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
+use crate::store::{self, is_scene};
 use crate::study::heat::Cost;
 use crate::traverse::Kernel;
 use report::{Report, Shot};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracing::{debug, info};
 
@@ -67,6 +70,8 @@ pub struct Args {
     build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Write what each pixel's ray costs instead of what it sees: .png in colours, .exr or .pfm as numbers
     #[arg(
         long,
@@ -97,7 +102,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     // Everything that can be wrong with the options, before any work.
     let isa = Isa::from_env()?;
-    let profile = args.build.profile_for(args.scene.as_deref())?;
+    let profile = args.build.profile_for(args.scene.as_deref(), true)?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
@@ -109,7 +114,11 @@ pub fn run(args: &Args) -> Result<()> {
     info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
+    let memory = args.build.limit()?;
     let mut scene = match &args.scene {
+        Some(path) if is_scene(path) && memory.is_some() => {
+            args.open_within(path, memory.unwrap_or_default(), &settings, accuracy, isa)?
+        }
         Some(path) => Scene::prepare(path, &args.build, &profile.build, isa)?,
         None => Model::demo().build(&args.build, &profile.build, isa)?,
     };
@@ -123,10 +132,40 @@ pub fn run(args: &Args) -> Result<()> {
     match &scene.looks {
         Looks::Mesh(mesh) => args.render(&scene, mesh, settings, cameras),
         Looks::Stored(stored) => args.render(&scene, stored, settings, cameras),
+        Looks::Cached(cached) => args.render(&scene, cached, settings, cameras),
     }
 }
 
+/// Memory of a thread that renders: the touched part of its stack, and its tile.
+const BYTES_PER_WORKER: usize = 256 << 10;
+
 impl Args {
+    /// A scene file of which a part will be in memory.
+    fn open_within(
+        &self,
+        path: &Path,
+        memory: usize,
+        settings: &RenderSettings,
+        accuracy: Accuracy,
+        isa: Isa,
+    ) -> Result<Scene> {
+        let wrong = |option: &str, message: &str| Err(Error::option(option, message));
+        if accuracy == Accuracy::Fast {
+            return wrong(
+                "--accuracy",
+                "fast keeps a record of every triangle beside the tree, for which --memory has no room; choose \
+                 watertight or exact",
+            );
+        }
+        if self.heatmap.is_some() {
+            return wrong("--heatmap", "it walks a tree that is all in memory; leave --memory out");
+        }
+        let options = self.cache.options()?;
+        let threads = settings.tuning.worker_count();
+        let beside = settings.frame_bytes() + options.loading.workers(threads) * BYTES_PER_WORKER;
+        Scene::open_within(&store::File::open(path)?, &options, [memory, beside], threads, isa)
+    }
+
     /// Renders a frame for each camera, the first of which the light is made for, and reports.
     fn render(
         &self,
@@ -135,7 +174,7 @@ impl Args {
         settings: RenderSettings,
         cameras: Vec<Camera>,
     ) -> Result<()> {
-        let lighting = self.lighting(&cameras[0], scene);
+        let lighting = scene.reading(|| self.lighting(&cameras[0], scene))?;
         let renderer = Renderer::new(&scene.accel, surface, settings)?;
         let mut shots = Vec::with_capacity(cameras.len());
         let tiles_done = AtomicUsize::new(0);
@@ -143,14 +182,16 @@ impl Args {
         let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
         watch("rendering", fraction, || {
             for (number, camera) in (0..).zip(cameras) {
-                let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done);
+                let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
                 let file = self.outputs.write(&frame, number, self.orbit)?;
                 debug!("frame {number} in {:.4} s", stats.seconds);
                 shots.push(Shot { file, camera, stats });
             }
             Ok::<(), Error>(())
         })?;
-        let report = Report::new(scene, renderer.settings(), self.build.name(), shots);
+        let budget = self.build.limit()?.unwrap_or_default();
+        let cache = scene.accel.cached().map(|cached| CacheReport::new(budget, cached));
+        let report = Report::new(scene, renderer.settings(), self.build.name(), shots, cache);
         self.json.give(&report.text(scene), &report)
     }
 

@@ -1,16 +1,20 @@
 //! What commands trace: a model and its tree, just built, or a scene file.
 
+use super::cache_options::taken_so_far;
 use super::model::Model;
 use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
+use crate::cache::{CacheOptions, Cached};
 use crate::error::Result;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::{Mesh, ReadReport};
+use crate::scene::CachedSurface;
 use crate::simd::Isa;
 use crate::store::{self, Stored, is_scene};
 use crate::traverse::Accel;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 use tracing::info;
 
@@ -36,6 +40,8 @@ pub enum Looks {
     Mesh(Mesh),
     /// The scene file.
     Stored(Stored),
+    /// The scene file, of which a part is in memory.
+    Cached(CachedSurface),
 }
 
 /// How a scene came here.
@@ -87,7 +93,25 @@ pub struct SceneReport<'a> {
     bounds: [[f32; 3]; 2],
     #[serde(flatten)]
     origin: &'a Origin,
-    tree: &'a TreeStats,
+    tree: TreeReport<'a>,
+}
+
+/// The figures about a tree.
+#[derive(Debug, Serialize)]
+struct TreeReport<'a> {
+    #[serde(flatten)]
+    stats: &'a TreeStats,
+    /// [`KdTree::duplication`](crate::kdtree::KdTree::duplication), where it was counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    duplication_histogram: Option<&'a [usize]>,
+}
+
+impl<'a> SceneReport<'a> {
+    /// The same with how many leaves triangles are in.
+    pub fn with_duplication(mut self, histogram: &'a [usize]) -> Self {
+        self.tree.duplication_histogram = Some(histogram);
+        self
+    }
 }
 
 impl Scene {
@@ -111,13 +135,36 @@ impl Scene {
         let start = Instant::now();
         let accel = Accel::of_tree(file.tree()?).with_isa(isa);
         let looks = Looks::Stored(file.stored()?);
-        let open_seconds = start.elapsed().as_secs_f64();
+        let tree = accel.stats();
+        Ok(Self::of_file(file, accel, tree, looks, start.elapsed().as_secs_f64()))
+    }
+
+    /// The scene in a scene file, of which a part is in memory: all that the process takes is to stay within
+    /// `memory`, with `beside` for what is still to come, while `threads` are at work.
+    ///
+    /// # Errors
+    /// The file is damaged where it is read now, or the memory is too little.
+    pub fn open_within(
+        file: &store::File,
+        options: &CacheOptions,
+        [memory, beside]: [usize; 2],
+        threads: usize,
+        isa: Isa,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let cached = Arc::new(Cached::open(file, options, memory, beside + taken_so_far(), threads)?);
+        let accel = Accel::of_cached(Arc::clone(&cached)).with_isa(isa);
+        let looks = Looks::Cached(CachedSurface::new(cached, file));
+        Ok(Self::of_file(file, accel, file.meta().stats.clone(), looks, start.elapsed().as_secs_f64()))
+    }
+
+    fn of_file(file: &store::File, accel: Accel, tree: TreeStats, looks: Looks, open_seconds: f64) -> Self {
         info!("opened {} in {}", file.path().display(), duration(open_seconds));
         let meta = file.meta();
-        Ok(Self {
+        Self {
             name: file.path().display().to_string(),
             vertices: meta.vertices,
-            tree: accel.stats(),
+            tree,
             accel,
             looks,
             origin: Origin::Opened {
@@ -126,14 +173,25 @@ impl Scene {
                 source: meta.source.clone(),
                 made_by: meta.engine.clone(),
             },
-        })
+        }
+    }
+
+    /// Does something that traces. What of the scene cannot be read meanwhile is an error.
+    ///
+    /// # Errors
+    /// The scene file cannot be read.
+    pub fn reading<R>(&self, work: impl FnOnce() -> R) -> Result<R> {
+        match self.accel.cached() {
+            Some(cached) => cached.or_error(work),
+            None => Ok(work()),
+        }
     }
 
     /// The mesh that it was built of; `None` for a scene file.
     pub fn mesh(&self) -> Option<&Mesh> {
         match &self.looks {
             Looks::Mesh(mesh) => Some(mesh),
-            Looks::Stored(_) => None,
+            Looks::Stored(_) | Looks::Cached(_) => None,
         }
     }
 
@@ -146,7 +204,7 @@ impl Scene {
             vertices: self.vertices,
             bounds: [bounds.min.to_array(), bounds.max.to_array()],
             origin: &self.origin,
-            tree: &self.tree,
+            tree: TreeReport { stats: &self.tree, duplication_histogram: None },
         }
     }
 

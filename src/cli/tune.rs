@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::files::{check_writable, write_text};
 use crate::scene::Camera;
 use crate::simd::Isa;
-use crate::study::accuracy::tradeoff::plot::Format;
+use crate::study::plot::Format;
 use crate::study::tune::{Load, Options, plot, run as search};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -13,6 +13,7 @@ mod parts;
 mod preset;
 mod sah;
 mod scale;
+mod spread;
 mod stats;
 mod validate;
 
@@ -23,6 +24,7 @@ pub use params::{BuildParams, MAX_DEPTH};
 pub use parts::{Arrays, Parts};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};
+pub use spread::SPREAD_BLOCKS;
 pub use stats::TreeStats;
 
 use crate::column::Column;
@@ -30,7 +32,6 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::mesh::Mesh;
-use glam::Vec3;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -56,12 +57,6 @@ pub trait Tree {
     fn beneath(&self, place: usize) -> Node;
     /// The primitives that a page of the upper tree holds, each once.
     fn page(&self, leaf: Node) -> &[u32];
-    /// The tree in cache lines; the root is the first.
-    fn lines(&self) -> &[Line];
-    /// The words of all leaves' records.
-    fn references(&self) -> &[u32];
-    /// The primitive ids of the leaf whose record begins at a word.
-    fn record(&self, word: usize) -> &[u32];
     /// A triangle's record.
     fn triangle(&self, primitive: u32) -> &Triangle;
     /// A triangle's corners.
@@ -69,6 +64,17 @@ pub trait Tree {
     fn corners(&self, primitive: u32) -> &Corners {
         &self.triangle(primitive).corners
     }
+
+    /// Said before a walk looks at an inner node's children, or at a leaf's triangles. A tree that is not
+    /// all in memory gets them now; what it has given out before may be gone then.
+    #[inline(always)]
+    fn enter(&self, _node: Node) {}
+    /// The same, before a walk looks at a page's triangles.
+    #[inline(always)]
+    fn enter_page(&self, _leaf: Node) {}
+    /// The same, before one triangle is looked at by itself.
+    #[inline(always)]
+    fn enter_triangle(&self, _primitive: u32) {}
 }
 
 /// A kd-tree in memory: nodes, the leaves' references, and the triangles' corners.
@@ -137,8 +143,26 @@ impl KdTree {
 
     /// The box around all triangles, in the mesh's coordinates.
     pub fn mesh_bounds(&self) -> Aabb {
-        let [min, max, _] = self.scale.undo(&[self.bounds.min, self.bounds.max, Vec3::ZERO].map(Vec3::into));
-        Aabb { min: min.into(), max: max.into() }
+        self.scale.undo_bounds(&self.bounds)
+    }
+
+    /// The tree in cache lines; the root is the first.
+    #[inline(always)]
+    pub fn lines(&self) -> &[Line] {
+        self.lines.all()
+    }
+
+    /// The words of all leaves' records.
+    #[inline(always)]
+    pub fn references(&self) -> &[u32] {
+        &self.references
+    }
+
+    /// The primitive ids of the leaf whose record begins at a word.
+    #[inline(always)]
+    pub fn record(&self, word: usize) -> &[u32] {
+        let first = word + 1;
+        &self.references[first..first + self.references[word] as usize]
     }
 
     /// All triangles, by primitive id, in the tree's coordinates.
@@ -245,22 +269,6 @@ impl Tree for KdTree {
     #[inline(always)]
     fn page(&self, leaf: Node) -> &[u32] {
         &self.pages.primitives[leaf.references()]
-    }
-
-    #[inline(always)]
-    fn lines(&self) -> &[Line] {
-        self.lines.all()
-    }
-
-    #[inline(always)]
-    fn references(&self) -> &[u32] {
-        &self.references
-    }
-
-    #[inline(always)]
-    fn record(&self, word: usize) -> &[u32] {
-        let first = word + 1;
-        &self.references[first..first + self.references[word] as usize]
     }
 
     #[inline(always)]

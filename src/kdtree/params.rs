@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// The deepest tree that the kernels have stack for.
 pub const MAX_DEPTH: usize = 64;
 
+/// The most bins of an axis: the builder's tables have this length.
+pub(super) const MOST_BINS: usize = 1024;
+
 /// Build settings. The defaults suit all kernels on most models.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -82,8 +85,8 @@ impl BuildParams {
             fail("min_leaf", "must be between 1 and 1048576")
         } else if self.max_depth > MAX_DEPTH {
             fail("max_depth", "must be at most 64 (0 derives it from the model)")
-        } else if !(8..=1024).contains(&self.bins) {
-            fail("bins", "must be between 8 and 1024")
+        } else if !(8..=MOST_BINS).contains(&self.bins) {
+            fail("bins", &format!("must be between 8 and {MOST_BINS}"))
         } else if !(1.0..=1000.0).contains(&self.max_duplication) {
             fail("max_duplication", "must be between 1 and 1000")
         } else if !(1..=1 << 20).contains(&self.page) {

@@ -7,6 +7,7 @@
 
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Corners;
+use glam::Vec3;
 
 /// Meshes whose greatest coordinate has an exponent in this range are kept as they are.
 const ORDINARY: std::ops::RangeInclusive<i32> = -30..=40;
@@ -64,6 +65,12 @@ impl Scale {
     /// Corners as the mesh has them (but for denormal ones that were made smaller).
     pub fn undo(self, corners: &Corners) -> Corners {
         corners.map(|c| c.map(|x| (f64::from(x) / self.factor()) as f32))
+    }
+
+    /// A box in the mesh's coordinates.
+    pub fn undo_bounds(self, bounds: &Aabb) -> Aabb {
+        let [min, max, _] = self.undo(&[bounds.min, bounds.max, Vec3::ZERO].map(Vec3::into));
+        Aabb { min: min.into(), max: max.into() }
     }
 }
 

@@ -31,8 +31,6 @@ pub struct TreeStats {
     pub depth_histogram: Vec<usize>,
     /// Inner nodes on the longest way from the root to a leaf.
     pub depth: usize,
-    /// `duplication_histogram[i]` triangles are in `i + 1` leaves; the last entry counts those in more.
-    pub duplication_histogram: Vec<usize>,
     /// Expected cost of a ray by the SAH, in the units of the build parameters.
     pub sah_cost: f64,
     /// Expected inner nodes for a ray that meets the bounds, early termination not counted.
@@ -80,7 +78,6 @@ impl KdTree {
         let mut stats = TreeStats {
             triangles: self.triangles.len(),
             leaf_histogram: vec![0; HISTOGRAM + 1],
-            duplication_histogram: vec![0; HISTOGRAM],
             node_bytes: self.nodes.len() * size_of::<Node>(),
             reference_bytes: self.references.len() * size_of::<u32>(),
             triangle_bytes: self.triangles.len() * size_of::<Triangle>(),
@@ -92,16 +89,12 @@ impl KdTree {
         let root_area = self.bounds.area();
         let probability = |cell: &Aabb| if root_area > 0.0 { cell.area() / root_area } else { 1.0 };
 
-        let mut leaves_of = vec![0u32; self.triangles.len()];
         let mut stack = vec![(self.root(), self.bounds, 0)];
         while let Some((node, cell, depth)) = stack.pop() {
             stats.nodes += 1;
             stats.depth = stats.depth.max(depth);
             if node.is_leaf() {
                 let count = self.primitives(node).len();
-                for &primitive in self.primitives(node) {
-                    leaves_of[primitive as usize] += 1;
-                }
                 if stats.depth_histogram.len() <= depth {
                     stats.depth_histogram.resize(depth + 1, 0);
                 }
@@ -122,11 +115,6 @@ impl KdTree {
             }
         }
 
-        // Triangles without area may be in no leaf.
-        for count in leaves_of.into_iter().filter(|&count| count > 0) {
-            stats.duplication_histogram[(count as usize).min(HISTOGRAM) - 1] += 1;
-        }
-
         let triangles = stats.triangles.max(1) as f64;
         stats.references_per_triangle = stats.references as f64 / triangles;
         stats.triangles_per_leaf =
@@ -136,5 +124,23 @@ impl KdTree {
             + f64::from(self.params.intersection_cost) * stats.expected_tests;
         stats.bytes_per_triangle = stats.bytes() as f64 / triangles;
         stats
+    }
+
+    /// How often perfect splits cut triangles: entry `i` counts those in `i + 1` leaves, the last one also
+    /// those in more. Triangles without area may be in no leaf, and are not counted then.
+    ///
+    /// Walks the whole tree, and takes four bytes a triangle meanwhile.
+    pub fn duplication(&self) -> Vec<usize> {
+        let mut leaves_of = vec![0u32; self.triangles.len()];
+        for leaf in self.nodes.iter().filter(|node| node.is_leaf()) {
+            for &primitive in self.primitives(*leaf) {
+                leaves_of[primitive as usize] += 1;
+            }
+        }
+        let mut histogram = vec![0; HISTOGRAM];
+        for count in leaves_of.into_iter().filter(|&count| count > 0) {
+            histogram[(count as usize).min(HISTOGRAM) - 1] += 1;
+        }
+        histogram
     }
 }

@@ -83,6 +83,17 @@ fn a_large_soup_pays_off() {
 }
 
 #[test]
+fn every_reference_is_a_triangle_in_a_leaf() {
+    let tree = KdTree::build(&soup(2_000, 0.5, 3), &BuildParams::default(), None).expect("builds");
+    let histogram = tree.duplication();
+    assert_eq!(histogram.iter().sum::<usize>(), 2_000, "each is in some leaf");
+    assert_eq!(histogram.last(), Some(&0), "none is in so many that they are not told apart");
+    let references: usize = histogram.iter().zip(1..).map(|(triangles, leaves)| triangles * leaves).sum();
+    assert_eq!(references, tree.stats().references);
+    assert!(histogram[0] < 2_000, "some are cut");
+}
+
+#[test]
 fn coincident_triangles_end_in_one_leaf() {
     let one = soup(1, 1.0, 7).positions;
     let mesh = mesh_of(std::iter::repeat_n([one[0], one[1], one[2]], 1000));

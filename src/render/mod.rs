@@ -21,6 +21,6 @@ pub use frame::Frame;
 pub use offset::offset_point;
 pub use order::{Tile, tiles};
 pub use renderer::Renderer;
-pub use scheduler::{Outcome, Workers};
+pub use scheduler::{Outcome, Sharing, Workers};
 pub use settings::{Aovs, RenderSettings, Size, Tuning};
 pub use stats::{FrameStats, RayCount};

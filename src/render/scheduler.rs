@@ -11,6 +11,18 @@ pub struct Workers {
     pub threads: usize,
     /// Whether each is bound to a processor of its own (as far as there are enough).
     pub pin: bool,
+    /// Who does which job.
+    pub sharing: Sharing,
+}
+
+/// Who does which job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// Each worker begins with a run of jobs that follow one another and does them in order; one that has
+    /// none left steals from the far end of another's run, job by job.
+    Runs,
+    /// Each takes the first job that is left: all are near one another all the time.
+    Queue,
 }
 
 /// What is left when all jobs are done.
@@ -25,10 +37,7 @@ pub struct Outcome<S> {
 impl Workers {
     /// Does every job once and returns when all are done.
     ///
-    /// Each worker begins with a run of jobs that follow one another and does them in order; one
-    /// that has none left steals from the far end of another's run, job by job. (As no job makes
-    /// new ones, there is no need for a common queue, and a worker that finds all runs empty is
-    /// done.) `state` makes what a worker keeps from job to job: it is called once per worker, on
+    /// As no job makes new ones, a worker that finds nothing left is done. `state` makes what a worker keeps from job to job: it is called once per worker, on
     /// its thread.
     ///
     /// # Panics
@@ -39,7 +48,11 @@ impl Workers {
         state: impl Fn() -> S + Sync,
         work: impl Fn(&mut S, J) + Sync,
     ) -> Outcome<S> {
-        let deques = shares(jobs, self.threads.max(1));
+        let threads = self.threads.max(1);
+        let deques = match self.sharing {
+            Sharing::Runs => shares(jobs, threads),
+            Sharing::Queue => queue(jobs, threads),
+        };
         let stealers: Vec<Stealer<J>> = deques.iter().map(Worker::stealer).collect();
         let cores = if self.pin { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
 
@@ -75,6 +88,13 @@ impl Workers {
             panicked.map_or(outcome, |payload| panic::resume_unwind(payload))
         })
     }
+}
+
+/// All jobs in the first deque, which is taken from at the front whoever takes.
+fn queue<J>(jobs: Vec<J>, count: usize) -> Vec<Worker<J>> {
+    let deques: Vec<Worker<J>> = (0..count).map(|_| Worker::new_fifo()).collect();
+    jobs.into_iter().for_each(|job| deques[0].push(job));
+    deques
 }
 
 /// Runs of jobs of almost equal length. The owner pops at one end and thieves take from the
@@ -113,9 +133,19 @@ mod tests {
 
     #[test]
     fn every_job_is_done_once() {
-        for (threads, jobs) in [(1, 0), (1, 10), (2, 1), (3, 100), (16, 1000), (7, 6)] {
+        use Sharing::{Queue, Runs};
+        for (threads, jobs, sharing) in [
+            (1, 0, Runs),
+            (1, 10, Runs),
+            (2, 1, Runs),
+            (3, 100, Runs),
+            (16, 1000, Runs),
+            (7, 6, Runs),
+            (1, 0, Queue),
+            (16, 1000, Queue),
+        ] {
             let done: Vec<AtomicU32> = (0..jobs).map(|_| AtomicU32::new(0)).collect();
-            let outcome = Workers { threads, pin: false }.run(
+            let outcome = Workers { threads, pin: false, sharing }.run(
                 (0..jobs).collect(),
                 || 0,
                 |count, job: usize| {
@@ -131,10 +161,22 @@ mod tests {
 
     #[test]
     fn one_worker_keeps_the_order() {
-        let outcome =
-            Workers { threads: 1, pin: false }
-                .run((0..50).collect(), Vec::new, |seen, job: u32| seen.push(job));
+        let outcome = Workers { threads: 1, pin: false, sharing: Sharing::Runs }.run(
+            (0..50).collect(),
+            Vec::new,
+            |seen, job: u32| seen.push(job),
+        );
         assert_eq!(outcome.states[0], (0..50).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_queue_is_taken_from_at_the_front() {
+        let deques = queue((0..10).collect(), 3);
+        let stealers: Vec<Stealer<u32>> = deques.iter().map(Worker::stealer).collect();
+        assert_eq!(deques[0].pop(), Some(0));
+        assert_eq!(steal(&stealers, 2), Some(1));
+        assert_eq!(steal(&stealers, 1), Some(2));
+        assert_eq!(deques[0].pop(), Some(3));
     }
 
     #[test]
@@ -152,7 +194,7 @@ mod tests {
         // The owner of the first run waits in its first job until all others are done: of its run
         // nothing but that job is its own work.
         let others = AtomicU32::new(0);
-        Workers { threads: 2, pin: false }.run(
+        Workers { threads: 2, pin: false, sharing: Sharing::Runs }.run(
             (0..64).collect(),
             || (),
             |(), job: u32| {
@@ -170,7 +212,7 @@ mod tests {
     #[test]
     fn a_panic_comes_through() {
         let caught = panic::catch_unwind(|| {
-            Workers { threads: 3, pin: false }.run(
+            Workers { threads: 3, pin: false, sharing: Sharing::Runs }.run(
                 (0..9).collect(),
                 || (),
                 |(), job: u32| {
@@ -184,9 +226,11 @@ mod tests {
 
     #[test]
     fn pinning_is_reported() {
-        let outcome = Workers { threads: 2, pin: true }.run(vec![(); 4], || (), |(), ()| {});
+        let outcome =
+            Workers { threads: 2, pin: true, sharing: Sharing::Runs }.run(vec![(); 4], || (), |(), ()| {});
         assert!(outcome.pinned <= 2);
-        let outcome = Workers { threads: 2, pin: false }.run(vec![(); 4], || (), |(), ()| {});
+        let outcome =
+            Workers { threads: 2, pin: false, sharing: Sharing::Runs }.run(vec![(); 4], || (), |(), ()| {});
         assert_eq!(outcome.pinned, 0);
     }
 }

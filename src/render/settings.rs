@@ -188,6 +188,13 @@ impl RenderSettings {
         Self { size, samples: 1, shadows: true, aovs: Aovs::default(), tuning: Tuning::default() }
     }
 
+    /// Bytes of a frame while it is rendered, put together and written.
+    pub fn frame_bytes(&self) -> usize {
+        let floats = 3 + usize::from(self.aovs.depth) + 3 * usize::from(self.aovs.normal);
+        // Tile by tile, and put together; and the bytes of one picture that is written.
+        self.size.pixels() as usize * (2 * floats * size_of::<f32>() + 4)
+    }
+
     /// Checks that every value makes sense.
     ///
     /// # Errors

@@ -52,6 +52,15 @@ impl RayCount {
     }
 }
 
+/// The time that a share of some times stays below: 0 of none.
+pub(super) fn quantile(times: &mut [f32], share: f64) -> f64 {
+    if times.is_empty() {
+        return 0.0;
+    }
+    let at = ((times.len() as f64 * share) as usize).min(times.len() - 1);
+    f64::from(*times.select_nth_unstable_by(at, f32::total_cmp).1)
+}
+
 /// What a frame cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FrameStats {
@@ -65,8 +74,24 @@ pub struct FrameStats {
     pub seconds: f64,
     /// Tiles.
     pub tiles: usize,
+    /// Seconds that half of the tiles stayed below, from their beginning to their end.
+    pub tile_p50: f64,
+    /// Seconds that 99 % of them stayed below.
+    pub tile_p99: f64,
     /// Workers.
     pub threads: usize,
     /// Workers that were bound to a processor.
     pub pinned: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_times() {
+        let mut times: Vec<f32> = (0..1000).rev().map(|i| i as f32).collect();
+        assert_eq!([0.0, 0.5, 0.99, 1.0].map(|q| quantile(&mut times, q)), [0.0, 500.0, 990.0, 999.0]);
+        assert_eq!(quantile(&mut [], 0.5), 0.0);
+    }
 }

@@ -7,7 +7,7 @@ use super::shade::Shader;
 use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
 use crate::scene::{Surface, View};
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -121,6 +121,8 @@ pub(super) struct Scratch<const W: usize> {
     pub dispatch: Dispatch,
     pub camera: Tally,
     pub shadow: Tally,
+    /// Seconds that each tile took, waiting included.
+    pub tiles: Vec<f32>,
 }
 
 impl<const W: usize> Scratch<W> {
@@ -139,6 +141,7 @@ impl<const W: usize> Scratch<W> {
             dispatch,
             camera: Tally::default(),
             shadow: Tally::default(),
+            tiles: Vec::new(),
         }
     }
 }
@@ -177,10 +180,13 @@ where
 {
     /// Renders a tile into its pixels.
     pub fn render(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>) {
+        let start = Instant::now();
         let mut pixels = pixels;
         let tile = pixels.tile;
         for y in (0..tile.height).step_by(SQUARE as usize) {
             for x in (0..tile.width).step_by(SQUARE as usize) {
+                // A scene that is in memory in part gives its turns by squares.
+                let _session = self.accel.cached().map(|cached| cached.session());
                 let used = scratch.cover(&tile, x, y);
                 for sample in 0..self.samples {
                     self.sample(scratch, used, sample, &mut pixels);
@@ -188,23 +194,24 @@ where
                 self.write(scratch, used, &mut pixels);
             }
         }
+        scratch.tiles.push(start.elapsed().as_secs_f32());
     }
 
     /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
     fn sample(&self, scratch: &mut Scratch<W>, used: usize, sample: u32, pixels: &mut TilePixels<'_>) {
-        let start = Instant::now();
+        let start = Stopwatch::start(self.accel);
         let active = &scratch.active[..used];
         self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
         let (rays, hits) = (&scratch.rays[..used], &mut scratch.hits[..used]);
         (self.calls.intersect)(&mut scratch.dispatch, self.accel, rays, active, hits);
         scratch.camera.rays += count(active);
-        scratch.camera.time += start.elapsed();
+        scratch.camera.time += start.elapsed(self.accel);
 
         for packet in 0..used {
             self.shade(scratch, packet, sample == 0, pixels);
         }
 
-        let start = Instant::now();
+        let start = Stopwatch::start(self.accel);
         let lit = &scratch.lit[..used];
         let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
         (self.calls.occluded)(&mut scratch.dispatch, self.accel, rays, lit, occluded);
@@ -214,7 +221,7 @@ where
             }
         }
         scratch.shadow.rays += count(lit);
-        scratch.shadow.time += start.elapsed();
+        scratch.shadow.time += start.elapsed(self.accel);
     }
 
     /// Makes the rays through a point of each pixel.

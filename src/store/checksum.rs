@@ -15,7 +15,7 @@ pub const BLOCK: usize = 4096;
 const BLOCKS_PER_TASK: usize = 64;
 
 /// The checksum of a whole block.
-pub(super) fn of_block(block: &[u8]) -> u32 {
+pub fn of_block(block: &[u8]) -> u32 {
     debug_assert_eq!(block.len(), BLOCK);
     xxh3_64(block) as u32
 }

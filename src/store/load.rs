@@ -5,7 +5,7 @@ use super::reader::File;
 use super::section::Kind;
 use crate::column::Column;
 use crate::error::{Error, Result};
-use crate::kdtree::{KdTree, Parts};
+use crate::kdtree::{KdTree, Node, Parts};
 use crate::mesh::{Colors, Material, Mesh};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -41,6 +41,21 @@ impl File {
             stats: meta.stats.clone(),
         })
         .map_err(|what| Error::malformed(self.path(), format!("its tree is none: {what}")))
+    }
+
+    /// The upper tree, the places of its nodes in the full tree, and the full tree's root: what has to be known
+    /// to fetch all else piece by piece. Checks the checksums of no more than that.
+    ///
+    /// # Errors
+    /// A section is damaged or empty.
+    pub fn upper_tree(&self) -> Result<(Column<Node>, Column<u32>, Node)> {
+        self.verify_sections(&[Kind::Upper, Kind::Beneath])?;
+        self.verify_first_block(Kind::Nodes)?;
+        let (upper, beneath) = (self.column(Kind::Upper), self.column::<u32>(Kind::Beneath));
+        match self.column::<Node>(Kind::Nodes).first() {
+            Some(&root) if !upper.is_empty() && upper.len() == beneath.len() => Ok((upper, beneath, root)),
+            _ => Err(Error::malformed(self.path(), "its tree is none: it has no root, or no upper nodes")),
+        }
     }
 
     /// A copy of the mesh. Checks the checksums of its sections first, unless that was done, and that it is a

@@ -1,7 +1,7 @@
 //! What is known about a scene, as JSON.
 
 use crate::geometry::Aabb;
-use crate::kdtree::{BuildParams, KdTree, Scale, Tree, TreeStats};
+use crate::kdtree::{BuildParams, KdTree, SPREAD_BLOCKS, Scale, Tree, TreeStats};
 use crate::mesh::{Colors, Mesh};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,8 @@ pub struct Meta {
     pub largest_leaf: usize,
     /// The most triangles in a page.
     pub largest_page: usize,
+    /// What [`KdTree::spread`] says of the tree.
+    pub spread: [usize; SPREAD_BLOCKS.len()],
     /// Where colours come from.
     pub colors: ColorMeta,
 }
@@ -82,6 +84,7 @@ impl Meta {
             build_peak: tree.build_peak(),
             largest_leaf: stats.largest_leaf,
             largest_page: pages.map(|page| page.references().len()).max().unwrap_or(0),
+            spread: tree.spread(),
             stats,
             colors: ColorMeta::of(&mesh.colors),
         }

@@ -27,7 +27,7 @@ mod section;
 mod stored;
 mod writer;
 
-pub use checksum::BLOCK;
+pub use checksum::{BLOCK, of_block as block_checksum};
 pub use header::VERSION;
 pub use meta::{ColorMeta, MaterialMeta, Meta};
 pub use reader::File;

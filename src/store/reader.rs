@@ -110,6 +110,13 @@ impl File {
         Ok(())
     }
 
+    /// Checks a section's first block.
+    pub(super) fn verify_first_block(&self, kind: Kind) -> Result<()> {
+        let blocks = self.section(kind).map_or(0..0, Section::blocks);
+        let first = blocks.start..blocks.end.min(blocks.start + 1);
+        self.verify_blocks(&[first], &|_| ())
+    }
+
     fn verify_blocks(&self, blocks: &[Range<usize>], progress: &(dyn Fn(f64) + Sync)) -> Result<()> {
         match first_damaged(&self.map, &self.checksums, blocks, progress) {
             None => Ok(()),

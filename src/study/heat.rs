@@ -2,6 +2,7 @@
 
 use super::bench::build::count::walk;
 use crate::error::{Error, Result};
+use crate::geometry::Ray;
 use crate::render::Size;
 use crate::scene::Camera;
 use crate::traverse::Accel;
@@ -66,26 +67,32 @@ pub fn map(accel: &Accel, camera: &Camera, size: Size, cost: Cost, row_done: imp
     costs.par_chunks_mut(size.width as usize).zip(0..size.height).for_each(|(row, y)| {
         for (pixel, x) in row.iter_mut().zip(0..) {
             let ray = view.ray(x, y, [0.5, 0.5]);
-            if cost == Cost::Time {
-                let run = |_| {
-                    let start = Instant::now();
-                    std::hint::black_box(accel.intersect(&ray));
-                    start.elapsed().as_nanos() as f32
-                };
-                *pixel = (0..RUNS).map(run).fold(f32::INFINITY, f32::min);
-                continue;
-            }
-            let hit = accel.intersect(&ray);
-            let [steps, leaves, tests] = walk(accel, &ray, if hit.is_hit() { hit.t } else { ray.tfar });
             *pixel = match cost {
-                Cost::Steps => steps as f32,
-                Cost::Leaves => leaves as f32,
-                Cost::Tests | Cost::Time => tests as f32,
+                Cost::Steps => walk_to_hit(accel, &ray)[0] as f32,
+                Cost::Leaves => walk_to_hit(accel, &ray)[1] as f32,
+                Cost::Tests => walk_to_hit(accel, &ray)[2] as f32,
+                Cost::Time => nanoseconds(accel, &ray),
             };
         }
         row_done();
     });
     costs
+}
+
+/// Inner nodes, leaves and triangles on a ray's way to its hit.
+fn walk_to_hit(accel: &Accel, ray: &Ray) -> [u64; 3] {
+    let hit = accel.intersect(ray);
+    walk(accel, ray, if hit.is_hit() { hit.t } else { ray.tfar })
+}
+
+/// The time that a ray takes in its quickest run.
+fn nanoseconds(accel: &Accel, ray: &Ray) -> f32 {
+    let run = |_| {
+        let start = Instant::now();
+        std::hint::black_box(accel.intersect(ray));
+        start.elapsed().as_nanos() as f32
+    };
+    (0..RUNS).map(run).fold(f32::INFINITY, f32::min)
 }
 
 /// How costs are distributed.

@@ -5,9 +5,12 @@
 
 pub mod accuracy;
 pub mod bench;
+pub mod cache;
 pub mod heat;
 #[cfg(feature = "peers")]
 pub mod peers;
+#[cfg(feature = "accuracy")]
+pub mod plot;
 pub mod rays;
 pub mod reference;
 pub mod resident;

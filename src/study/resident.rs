@@ -25,6 +25,16 @@ impl Resident {
     }
 }
 
+/// Bytes that are resident now; `None` if the system does not say.
+pub fn now() -> Option<u64> {
+    status("VmRSS:")
+}
+
+/// The most bytes that were resident so far, or since a [`Resident`] was started.
+pub fn peak() -> Option<u64> {
+    status("VmHWM:")
+}
+
 /// A line of the process's status, in bytes.
 fn status(key: &str) -> Option<u64> {
     let text = fs::read_to_string("/proc/self/status").ok()?;

@@ -3,7 +3,9 @@
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::query::{CountTile, InMode, IntersectPacket, IntersectTile, OccludedPacket, OccludedTile, Query};
+use super::records::Resident;
 use super::tile::{PACKETS, TileCounts};
+use crate::cache::Cached;
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
 use crate::geometry::triangle::{Exact, Fast, Watertight};
@@ -20,11 +22,20 @@ use std::sync::Arc;
 /// with several instruction sets and accuracies side by side.
 #[derive(Clone, Debug)]
 pub struct Accel {
-    pub(super) tree: Arc<KdTree>,
+    pub(super) storage: Storage,
     pub(super) chosen: Chosen,
     pub(super) accuracy: Accuracy,
     /// The fast test's records, empty until that mode is chosen.
     pub(super) projected: Arc<[Projected]>,
+}
+
+/// Where the tree is.
+#[derive(Clone, Debug)]
+pub(super) enum Storage {
+    /// All in memory.
+    Resident(Arc<KdTree>),
+    /// Some of it in memory.
+    Cached(Arc<Cached>),
 }
 
 impl Accel {
@@ -46,8 +57,17 @@ impl Accel {
 
     /// Wraps a tree, to be traced with the best instruction set that the machine has.
     pub fn of_tree(tree: KdTree) -> Self {
-        let tree = Arc::new(tree);
-        Self { tree, chosen: Chosen::best(), accuracy: Accuracy::default(), projected: Arc::default() }
+        Self::of_storage(Storage::Resident(Arc::new(tree)))
+    }
+
+    /// Wraps a scene of which only a part is in memory. It is traced by packets and tiles, not by streams,
+    /// and not with [`Accuracy::Fast`], which keeps records beside the tree.
+    pub fn of_cached(cached: Arc<Cached>) -> Self {
+        Self::of_storage(Storage::Cached(cached))
+    }
+
+    fn of_storage(storage: Storage) -> Self {
+        Self { storage, chosen: Chosen::best(), accuracy: Accuracy::default(), projected: Arc::default() }
     }
 
     /// The same, traced with another instruction set. Panics if this machine lacks it.
@@ -73,10 +93,11 @@ impl Accel {
     }
 
     /// Chooses the accuracy. The first choice of [`Accuracy::Fast`] makes that test's records, 44
-    /// bytes a triangle, which stay.
+    /// bytes a triangle, which stay. Panics for that choice if the scene is not all in memory.
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
         if accuracy == Accuracy::Fast && self.projected.is_empty() {
-            let records = self.tree.triangles().par_iter().map(|triangle| Projected::new(&triangle.corners));
+            let records =
+                self.tree().triangles().par_iter().map(|triangle| Projected::new(&triangle.corners));
             self.projected = records.collect::<Vec<_>>().into();
         }
         self.accuracy = accuracy;
@@ -92,32 +113,60 @@ impl Accel {
         self.accuracy
     }
 
-    /// The tree.
+    /// The tree. Panics if it is not all in memory.
     pub fn tree(&self) -> &KdTree {
-        &self.tree
+        match &self.storage {
+            Storage::Resident(tree) => tree,
+            Storage::Cached(_) => panic!("only a part of the scene is in memory"),
+        }
+    }
+
+    /// The scene that is in memory in part, if it is one.
+    pub fn cached(&self) -> Option<&Arc<Cached>> {
+        match &self.storage {
+            Storage::Resident(_) => None,
+            Storage::Cached(cached) => Some(cached),
+        }
     }
 
     /// The box around all triangles.
     pub fn bounds(&self) -> Aabb {
-        self.tree.mesh_bounds()
+        match &self.storage {
+            Storage::Resident(tree) => tree.mesh_bounds(),
+            Storage::Cached(cached) => cached.mesh_bounds(),
+        }
     }
 
-    /// Figures about the tree. Walks all of it.
+    /// Figures about the tree. Walks all of it, and panics if it is not all in memory.
     pub fn stats(&self) -> TreeStats {
-        self.tree.stats()
+        self.tree().stats()
     }
 
     /// Has a kernel called in the chosen mode, on the chosen instruction set.
     #[inline(always)]
     fn ask<Q: Query>(&self, query: Q) -> Q::Output {
-        let tree = &*self.tree;
-        let triangles = tree.triangles();
+        let tree = match &self.storage {
+            Storage::Resident(tree) => &**tree,
+            Storage::Cached(cached) => return self.ask_cached(cached, query),
+        };
+        let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
-            Accuracy::Fast => self.chosen.run(InMode::<_, Fast> { query, tree, records: &self.projected }),
-            Accuracy::Watertight => {
-                self.chosen.run(InMode::<_, Watertight> { query, tree, records: triangles })
+            Accuracy::Fast => {
+                let projected = Resident { tree, records: &self.projected };
+                self.chosen.run(InMode::<_, Fast, _>::new(query, &projected))
             }
-            Accuracy::Exact => self.chosen.run(InMode::<_, Exact> { query, tree, records: triangles }),
+            Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles)),
+            Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &triangles)),
+        }
+    }
+
+    /// The same for a scene that is in memory in part.
+    fn ask_cached<Q: Query>(&self, cached: &Cached, query: Q) -> Q::Output {
+        let tree = cached.view();
+        match self.accuracy {
+            Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &tree)),
+            Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &tree)),
+            Accuracy::Fast => unreachable!("`set_accuracy` does not take it"),
         }
     }
 
@@ -186,11 +235,13 @@ impl Accel {
     }
 
     /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, or, with `any_hit`,
-    /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode.
+    /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode. Panics if the scene is not all
+    /// in memory.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
         let query = CountTile { rays, active: &tile_lanes(rays, active), any_hit, counts: &mut *counts };
-        let (tree, records) = (&*self.tree, self.tree.triangles());
-        let done = self.chosen.run(InMode::<_, Watertight> { query, tree, records });
+        let tree = self.tree();
+        let triangles = Resident { tree, records: tree.triangles() };
+        let done = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
         counts.beams += u64::from(done);
     }
 
@@ -217,6 +268,7 @@ impl Accel {
             Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
             Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
+            Kernel::Stream if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
             Kernel::Stream => self.intersect_stream(rays, hits),
             Kernel::Tile => self.intersect_tiles(rays, hits),
         }
@@ -231,6 +283,7 @@ impl Accel {
             Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
             Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
+            Kernel::Stream if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
             Kernel::Stream => self.occluded_stream(rays, occluded),
             Kernel::Tile => self.occluded_tiles(rays, occluded),
         }

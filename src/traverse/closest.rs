@@ -1,9 +1,9 @@
 //! The closest hits so far, and how they become records.
 
 use super::lanes::HitPacket;
+use super::records::Records;
 use crate::geometry::NO_PRIMITIVE;
 use crate::geometry::triangle::{self, Candidate, Mode, Test};
-use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask};
 
 /// The id of no triangle yet: greater than any, so that equal `t` lets the first hit in.
@@ -72,12 +72,7 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     /// Hit records, with what belongs to the triangles filled in. If weights were not kept, `test` finds
     /// them again.
     #[inline(always)]
-    pub fn records<T: Tree, M: Mode>(
-        &self,
-        tree: &T,
-        records: &[M::Record],
-        test: Option<&M::Test<W, L>>,
-    ) -> HitPacket<W> {
+    pub fn records<T: Records<M>, M: Mode>(&self, tree: &T, test: Option<&M::Test<W, L>>) -> HitPacket<W> {
         let found = L::ids_less(self.primitive, L::ids(NONE));
         let ids = L::ids_store(L::ids_select(found, self.primitive, L::ids(NO_PRIMITIVE as i32)));
         let zero = L::splat(0.0);
@@ -90,7 +85,8 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
             let id = ids[rest.trailing_zeros() as usize % W];
             let lanes = !(L::ids_less(self.primitive, L::ids(id)) | L::ids_less(L::ids(id), self.primitive));
             rest &= !lanes.bits();
-            let record = &records[id as usize];
+            tree.enter_triangle(id as u32);
+            let record = tree.record_of(id as u32);
             let weights = match test {
                 Some(test) => {
                     let candidate = test.test(record, lanes);

@@ -17,15 +17,18 @@ mod lanes;
 mod packet;
 mod query;
 mod range;
+mod records;
 mod stack;
+mod stopwatch;
 mod stream;
 mod tile;
 mod walk;
 
 pub use accel::Accel;
-pub use dispatch::Dispatch;
+pub use dispatch::{Dispatch, DispatchPool};
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, PacketWidth, RayPacket};
+pub use stopwatch::Stopwatch;
 pub use tile::TileCounts;
 
 #[cfg(test)]

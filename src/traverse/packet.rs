@@ -13,10 +13,11 @@
 use super::closest::Closest;
 use super::lanes::{HitPacket, RayPacket};
 use super::range::{adapt, is_ordinary};
+use super::records::Records;
 use super::stack::Stack;
 use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::triangle::{Mode, Test};
-use crate::kdtree::{Node, Tree};
+use crate::kdtree::Node;
 use crate::simd::{Lanes, Mask};
 
 /// A subtree that waits for its turn, with the lanes' intervals in it.
@@ -26,18 +27,16 @@ struct Waiting<L> {
     interval: Interval<L>,
 }
 
-/// The closest hit of every lane in `active`. `records` holds what the mode keeps of each triangle.
+/// The closest hit of every lane in `active`.
 #[inline(always)]
-pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
+pub fn intersect<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode>(
     tree: &T,
-    records: &[M::Record],
     rays: &RayPacket<W>,
     active: u32,
 ) -> HitPacket<W> {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let mut hits =
-        walk::<W, L, T, M, false>(tree, records, traced, active).records::<T, M>(tree, records, None);
+    let mut hits = walk::<W, L, T, M, false>(tree, traced, active).records::<T, M>(tree, None);
     if let Some(adapted) = adapted {
         adapted.undo(rays, &mut hits, tree);
     }
@@ -46,22 +45,20 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
 
 /// The lanes in `active` that hit anything.
 #[inline(always)]
-pub fn occluded<const W: usize, L: Lanes<W>, T: Tree, M: Mode>(
+pub fn occluded<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode>(
     tree: &T,
-    records: &[M::Record],
     rays: &RayPacket<W>,
     active: u32,
 ) -> u32 {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let rays = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    walk::<W, L, T, M, true>(tree, records, rays, active).found() & active
+    walk::<W, L, T, M, true>(tree, rays, active).found() & active
 }
 
 /// Walks the tree; with `ANY`, a lane is done at its first hit.
 #[inline(always)]
-fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
+fn walk<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: bool>(
     tree: &T,
-    records: &[M::Record],
     rays: &RayPacket<W>,
     active: u32,
 ) -> Closest<W, L> {
@@ -71,17 +68,15 @@ fn walk<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
     if live != 0 {
         let test = M::Test::<W, L>::new(&load3(&rays.origin), &load3(&rays.direction), live);
         let tnear = L::load(&rays.tnear);
-        descend::<W, L, T, M, ANY>(tree, records, &walk, &test, tnear, tree.root(), interval, &mut closest);
+        descend::<W, L, T, M, ANY>(tree, &walk, &test, tnear, tree.root(), interval, &mut closest);
     }
     closest
 }
 
 /// Walks the subtree under `node`, in which the lanes are in `interval`. Some lane must be live.
-#[expect(clippy::too_many_arguments, reason = "it is one half of a function in two kernels")]
 #[inline(always)]
-pub fn descend<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
+pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: bool>(
     tree: &T,
-    records: &[M::Record],
     walk: &Walk<W, L>,
     test: &M::Test<W, L>,
     tnear: L,
@@ -96,6 +91,7 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
             let axis = node.axis();
             let wall = walk.crossing(axis, node.split());
             let parts = walk.cut(&interval, &wall);
+            tree.enter(node);
             let [below, above] = tree.children(node);
             let (first, second, [first_part, second_part]) = match walk.heading[axis] {
                 Heading::Up => (below, above, parts),
@@ -121,11 +117,12 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Tree, M: Mode, const ANY: bool>(
         }
 
         // Test the leaf's triangles against the lanes that are live in it.
+        tree.enter(node);
         let primitives = tree.primitives(node);
         if !primitives.is_empty() {
             let live = interval.live();
             for &primitive in primitives {
-                let candidate = test.test(&records[primitive as usize], live);
+                let candidate = test.test(tree.record_of(primitive), live);
                 closest.take::<ANY>(&candidate, primitive, tnear, live, true);
             }
         }

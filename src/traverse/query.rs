@@ -2,33 +2,40 @@
 
 use super::lanes::{HitPacket, PacketWidth, RayPacket};
 use super::packet;
+use super::records::Records;
 use super::tile::{self, PACKETS, TileCounts};
 use crate::geometry::triangle::Mode;
-use crate::kdtree::KdTree;
 use crate::simd::{Simd, Task};
+use std::marker::PhantomData;
 
 /// A call of a kernel.
 pub trait Query {
     /// What it gives.
     type Output;
 
-    /// Calls the kernel. `records` holds what the mode keeps of each triangle. Always inlined.
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> Self::Output;
+    /// Calls the kernel. Always inlined.
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> Self::Output;
 }
 
 /// A query in a mode, to be run on an instruction set.
-pub struct InMode<'a, Q, M: Mode> {
-    pub query: Q,
-    pub tree: &'a KdTree,
-    pub records: &'a [M::Record],
+pub struct InMode<'a, Q, M, T> {
+    query: Q,
+    tree: &'a T,
+    mode: PhantomData<M>,
 }
 
-impl<Q: Query, M: Mode> Task for InMode<'_, Q, M> {
+impl<'a, Q: Query, M: Mode, T: Records<M>> InMode<'a, Q, M, T> {
+    pub fn new(query: Q, tree: &'a T) -> Self {
+        Self { query, tree, mode: PhantomData }
+    }
+}
+
+impl<Q: Query, M: Mode, T: Records<M>> Task for InMode<'_, Q, M, T> {
     type Output = Q::Output;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Q::Output {
-        self.query.run::<S, M>(self.tree, self.records)
+        self.query.run::<S, M, T>(self.tree)
     }
 }
 
@@ -45,9 +52,9 @@ where
     type Output = HitPacket<W>;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> HitPacket<W> {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> HitPacket<W> {
         let Self { rays, active } = self;
-        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, records, rays, active)
+        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, rays, active)
     }
 }
 
@@ -64,9 +71,9 @@ where
     type Output = u32;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> u32 {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
         let Self { rays, active } = self;
-        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, records, rays, active)
+        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, rays, active)
     }
 }
 
@@ -81,9 +88,9 @@ impl Query for IntersectTile<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
         let Self { rays, active, hits } = self;
-        tile::intersect::<S, _, M, _>(tree, records, rays, active, hits, &mut ())
+        tile::intersect::<S, _, M, _>(tree, rays, active, hits, &mut ())
     }
 }
 
@@ -98,9 +105,9 @@ impl Query for OccludedTile<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
         let Self { rays, active, found } = self;
-        tile::occluded::<S, _, M, _>(tree, records, rays, active, found, &mut ())
+        tile::occluded::<S, _, M, _>(tree, rays, active, found, &mut ())
     }
 }
 
@@ -116,14 +123,14 @@ impl Query for CountTile<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode>(self, tree: &KdTree, records: &[M::Record]) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
         let Self { rays, active, any_hit, counts } = self;
         if any_hit {
             let found = &mut [0; PACKETS][..rays.len()];
-            tile::occluded::<S, _, M, _>(tree, records, rays, active, found, counts)
+            tile::occluded::<S, _, M, _>(tree, rays, active, found, counts)
         } else {
             let hits = &mut [const { HitPacket::miss() }; PACKETS][..rays.len()];
-            tile::intersect::<S, _, M, _>(tree, records, rays, active, hits, counts)
+            tile::intersect::<S, _, M, _>(tree, rays, active, hits, counts)
         }
     }
 }

@@ -1,9 +1,11 @@
 //! `raypack cast` from end to end. NumPy's files are made and taken apart here byte by byte, so that not
 //! the same code stands on both sides.
 
+#[path = "../common/mod.rs"]
+mod common;
 mod numpy;
 
-use assert_cmd::Command;
+use common::Place;
 use numpy::{Npz, npy, npy_of};
 use raypack::geometry::{Hit, Ray};
 use raypack::kdtree::BuildParams;
@@ -11,8 +13,6 @@ use raypack::traverse::Accel;
 use raypack::{Vec3, mesh};
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
 
 /// A unit square in the plane z = 0: triangles 0 (below the diagonal) and 1, of two materials.
 const SQUARE: &str = "mtllib square.mtl
@@ -49,76 +49,30 @@ const CASES: [([f32; 8], Expected); 14] = [
     ([0.75, 0.25, 1.0, 0.0, 0.0, 0.0, -INF, INF], None),
 ];
 
-/// A folder to run in, with the square.
-struct Place {
-    folder: TempDir,
+/// A folder with the square and its rays.
+fn square() -> Place {
+    let place = Place::new();
+    place.write("square.mtl", "newmtl lower\nKd 1 0 0\nnewmtl upper\nKd 0 0 1\n");
+    place.write("square.obj", SQUARE);
+    place.write("rays.npy", npy(&CASES.map(|(ray, _)| ray)));
+    place
 }
 
-impl Place {
-    fn new() -> Self {
-        let place = Self { folder: tempfile::tempdir().expect("a folder") };
-        place.write("square.mtl", "newmtl lower\nKd 1 0 0\nnewmtl upper\nKd 0 0 1\n");
-        place.write("square.obj", SQUARE);
-        place.write("rays.npy", npy(&CASES.map(|(ray, _)| ray)));
-        place
-    }
+/// Runs `raypack cast square.obj` to success and returns what it printed.
+fn cast(place: &Place, arguments: &str) -> String {
+    place.succeed(&format!("cast square.obj {arguments}"))
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
+/// Runs `raypack cast` to failure.
+fn fail(place: &Place, arguments: &str, expected: &[&str]) {
+    place.fail(&format!("cast {arguments}"), expected);
+}
 
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
-        fs::write(self.path(name), bytes).expect("written");
-    }
-
-    fn read(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).expect("written")
-    }
-
-    fn raypack(&self, arguments: &str) -> Command {
-        let mut command = Command::cargo_bin("raypack").expect("it was built");
-        command.current_dir(self.folder.path()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
-        command
-    }
-
-    /// Runs `raypack cast square.obj` to success and returns what it printed.
-    fn cast(&self, arguments: &str) -> String {
-        let output = self.raypack(&format!("cast square.obj {arguments}")).assert().success();
-        assert_eq!(String::from_utf8_lossy(&output.get_output().stderr), "", "{arguments}");
-        String::from_utf8(output.get_output().stdout.clone()).expect("text")
-    }
-
-    /// Runs it to failure: exit code 1, one line on standard error that holds all of `expected`, and
-    /// every file as it was.
-    fn fail(&self, arguments: &str, expected: &[&str]) {
-        let before = self.files();
-        let output = self.raypack(&format!("cast {arguments}")).assert().code(1).stdout("");
-        let message = String::from_utf8(output.get_output().stderr.clone()).expect("text");
-        assert!(message.starts_with("raypack: error: "), "{arguments}: {message}");
-        assert_eq!(message.matches('\n').count(), 1, "{arguments}: {message}");
-        for part in expected {
-            assert!(message.contains(part), "{arguments}: \"{part}\" is not in: {message}");
-        }
-        assert!(self.files() == before, "{arguments} changed a file");
-    }
-
-    /// The files here and what they hold; of folders, only the names.
-    fn files(&self) -> Vec<(String, Vec<u8>)> {
-        let entries = fs::read_dir(self.folder.path()).expect("a folder");
-        let mut files: Vec<_> = entries
-            .map(|entry| entry.expect("an entry"))
-            .map(|e| (e.file_name().to_string_lossy().into_owned(), fs::read(e.path()).unwrap_or_default()))
-            .collect();
-        files.sort();
-        files
-    }
-
-    /// Refuses what `rays` holds.
-    fn refuse(&self, rays: impl AsRef<[u8]>, expected: &[&str]) {
-        self.write("bad.npy", rays);
-        let all: Vec<&str> = ["bad.npy: "].iter().chain(expected).copied().collect();
-        self.fail("square.obj --rays bad.npy -o hits.npz", &all);
-    }
+/// Refuses what `rays` holds.
+fn refuse(place: &Place, rays: impl AsRef<[u8]>, expected: &[&str]) {
+    place.write("bad.npy", rays);
+    let all: Vec<&str> = ["bad.npy: "].iter().chain(expected).copied().collect();
+    fail(place, "square.obj --rays bad.npy -o hits.npz", &all);
 }
 
 fn json(text: &str) -> Value {
@@ -128,8 +82,8 @@ fn json(text: &str) -> Value {
 #[test]
 fn hits_are_what_they_are_documented_to_be() {
     for accuracy in ["fast", "watertight", "exact"] {
-        let place = Place::new();
-        place.cast(&format!("--rays rays.npy -o hits.npz --accuracy {accuracy}"));
+        let place = square();
+        cast(&place, &format!("--rays rays.npy -o hits.npz --accuracy {accuracy}"));
         let hits = Npz::parse(&place.read("hits.npz"));
         assert_eq!(hits.names(), ["t", "primitive", "geometry", "u", "v", "normal"]);
         let count = CASES.len();
@@ -151,14 +105,14 @@ fn hits_are_what_they_are_documented_to_be() {
 
 #[test]
 fn geometry_numbers_the_materials_that_info_lists() {
-    let place = Place::new();
+    let place = square();
     let info = place.raypack("info square.obj --json -").assert().success();
     let report = json(&String::from_utf8_lossy(&info.get_output().stdout));
     assert_eq!(report["colors"]["materials"][0]["name"], "lower");
     assert_eq!(report["colors"]["materials"][1]["name"], "upper");
 
     place.write("square.obj", SQUARE.replace("mtllib", "#").replace("usemtl", "\n#"));
-    place.cast("--rays rays.npy -o hits.npz");
+    cast(&place, "--rays rays.npy -o hits.npz");
     let hits = Npz::parse(&place.read("hits.npz"));
     assert!(hits.i64s("geometry").iter().zip(hits.i64s("primitive")).all(|(&g, p)| g == p.min(0)));
 }
@@ -166,8 +120,8 @@ fn geometry_numbers_the_materials_that_info_lists() {
 #[test]
 fn any_says_what_has_a_hit() {
     for accuracy in ["fast", "watertight", "exact"] {
-        let place = Place::new();
-        place.cast(&format!("--rays rays.npy -o any.npz --any --accuracy {accuracy}"));
+        let place = square();
+        cast(&place, &format!("--rays rays.npy -o any.npz --any --accuracy {accuracy}"));
         let answers = Npz::parse(&place.read("any.npz"));
         assert_eq!((answers.names(), answers.shape("occluded")), (vec!["occluded"], &[CASES.len()][..]));
         assert_eq!(answers.bools("occluded"), CASES.map(|(_, hit)| hit.is_some()), "{accuracy}");
@@ -176,8 +130,8 @@ fn any_says_what_has_a_hit() {
 
 #[test]
 fn every_order_of_bytes_and_items_is_read() {
-    let place = Place::new();
-    place.cast("--rays rays.npy -o expected.npz");
+    let place = square();
+    cast(&place, "--rays rays.npy -o expected.npz");
     let rays = CASES.map(|(ray, _)| ray);
     let rows: Vec<f32> = rays.concat();
     let columns: Vec<f32> = (0..8).flat_map(|c| rays.map(|ray| ray[c])).collect();
@@ -196,33 +150,33 @@ fn every_order_of_bytes_and_items_is_read() {
         ("another array after it", followed),
     ] {
         place.write("other.npy", file);
-        place.cast("--rays other.npy -o other.npz");
+        cast(&place, "--rays other.npy -o other.npz");
         assert!(place.read("other.npz") == place.read("expected.npz"), "{what}");
     }
 }
 
 #[test]
 fn no_rays_give_no_hits() {
-    let place = Place::new();
+    let place = square();
     for fortran in [false, true] {
         place.write("none.npy", npy_of(1, "'<f4'", fortran, "(0, 8)", &[]));
-        let report = json(&place.cast("--rays none.npy -o none.npz --json -"));
+        let report = json(&cast(&place, "--rays none.npy -o none.npz --json -"));
         assert_eq!((report["rays"].as_u64(), report["hits"].as_u64()), (Some(0), Some(0)));
         let hits = Npz::parse(&place.read("none.npz"));
         assert_eq!((hits.shape("t"), hits.shape("normal")), (&[0][..], &[0, 3][..]));
-        place.cast("--rays none.npy -o none.npz --any");
+        cast(&place, "--rays none.npy -o none.npz --any");
         assert_eq!(Npz::parse(&place.read("none.npz")).shape("occluded"), [0]);
     }
 }
 
 #[test]
 fn one_ray_may_be_flagged_either_way() {
-    let place = Place::new();
+    let place = square();
     let (ray, _) = CASES[0];
     let bytes: Vec<u8> = ray.iter().flat_map(|x| x.to_le_bytes()).collect();
     for fortran in [false, true] {
         place.write("one.npy", npy_of(1, "'<f4'", fortran, "(1, 8)", &bytes));
-        place.cast("--rays one.npy -o one.npz");
+        cast(&place, "--rays one.npy -o one.npz");
         assert_eq!(Npz::parse(&place.read("one.npz")).f32s("t"), [2.0]);
     }
 }
@@ -240,15 +194,15 @@ fn many() -> Vec<[f32; 8]> {
 
 #[test]
 fn threads_packets_and_instruction_sets_change_nothing() {
-    let place = Place::new();
+    let place = square();
     let rows = many();
     place.write("many.npy", npy(&rows));
-    place.cast("--rays many.npy -o expected.npz");
+    cast(&place, "--rays many.npy -o expected.npz");
     let expected = place.read("expected.npz");
     for tuning in
         ["--threads 1 --packet 1", "--threads 3 --packet 4", "--threads 0 --packet 8", "--packet 16"]
     {
-        place.cast(&format!("--rays many.npy -o other.npz {tuning}"));
+        cast(&place, &format!("--rays many.npy -o other.npz {tuning}"));
         assert!(place.read("other.npz") == expected, "{tuning}");
     }
     let mut portable = place.raypack("cast square.obj --rays many.npy -o other.npz");
@@ -269,13 +223,13 @@ fn threads_packets_and_instruction_sets_change_nothing() {
 
 #[test]
 fn the_report_says_how_it_went() {
-    let place = Place::new();
-    let text = place.cast("--rays rays.npy -o hits.npz --threads 1");
+    let place = square();
+    let text = cast(&place, "--rays rays.npy -o hits.npz --threads 1");
     for expected in ["square.obj", "rays       14, ", "watertight", "(chosen)", "1 thread", "closest hit"] {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
     }
     assert!(text.contains("\nhits       6\n") && text.contains("\nwrote      hits.npz in "), "{text}");
-    let report = json(&place.cast("--rays rays.npy -o a.npz --any --packet 4 --accuracy exact --json -"));
+    let report = json(&cast(&place, "--rays rays.npy -o a.npz --any --packet 4 --accuracy exact --json -"));
     assert_eq!(report["triangles"], 2);
     assert_eq!((&report["rays"], &report["hits"], &report["packet"]), (&14.into(), &6.into(), &4.into()));
     assert_eq!((&report["any"], &report["accuracy"]), (&true.into(), &"exact".into()));
@@ -288,8 +242,8 @@ fn the_report_says_how_it_went() {
 #[test]
 #[cfg(unix)]
 fn rays_may_come_through_a_pipe() {
-    let place = Place::new();
-    place.cast("--rays rays.npy -o expected.npz");
+    let place = square();
+    cast(&place, "--rays rays.npy -o expected.npz");
     let mut piped = place.raypack("cast square.obj --rays /dev/stdin -o hits.npz");
     piped.write_stdin(place.read("rays.npy")).assert().success();
     assert!(place.read("hits.npz") == place.read("expected.npz"));
@@ -303,7 +257,7 @@ fn rays_may_come_through_a_pipe() {
 
 #[test]
 fn shapes_that_are_no_rays_are_refused() {
-    let place = Place::new();
+    let place = square();
     for (shape, floats, expected) in [
         ("()", 1, "a single number"),
         ("(8,)", 8, "of shape 8"),
@@ -314,84 +268,84 @@ fn shapes_that_are_no_rays_are_refused() {
         ("(0, 7)", 0, "of shape 0 x 7"),
     ] {
         let file = npy_of(1, "'<f4'", false, shape, &vec![0; floats * 4]);
-        place.refuse(file, &[expected, "N x 8", "tnear"]);
+        refuse(&place, file, &[expected, "N x 8", "tnear"]);
     }
 }
 
 #[test]
 fn types_that_are_not_float32_are_refused() {
-    let place = Place::new();
+    let place = square();
     for descr in ["'<f8'", "'>f8'", "'<f2'", "'<i4'", "'<i8'", "'|u1'", "'|b1'", "'<c8'", "'|O'", "'<U4'"] {
         let file = npy_of(1, descr, false, "(3, 8)", &[0; 3 * 8 * 16]);
-        place.refuse(file, &[descr, "float32", "save rays.astype(np.float32)"]);
+        refuse(&place, file, &[descr, "float32", "save rays.astype(np.float32)"]);
     }
     let fields = npy_of(1, "[('o', '<f4', (3,)), ('n', '<f4')]", false, "(3, 8)", &[0; 512]);
-    place.refuse(fields, &["float32"]);
+    refuse(&place, fields, &["float32"]);
 }
 
 #[test]
 fn files_that_are_cut_short_are_refused() {
-    let place = Place::new();
+    let place = square();
     let whole = place.read("rays.npy");
     for length in [whole.len() - 1, whole.len() - 32, 130, 128] {
-        place.refuse(&whole[..length], &["truncated", "14 rays"]);
+        refuse(&place, &whole[..length], &["truncated", "14 rays"]);
     }
     for length in [100, 12, 11, 10, 9, 7, 5, 1, 0] {
-        place.refuse(&whole[..length], &[]);
+        refuse(&place, &whole[..length], &[]);
     }
 }
 
 #[test]
 fn what_is_no_npy_file_is_refused() {
-    let place = Place::new();
-    place.refuse("0.5 0.5 1 0 0 0 -1 9\n", &["not a .npy file", "np.save"]);
-    place.cast("--rays rays.npy -o hits.npz");
-    place.refuse(place.read("hits.npz"), &["archive", "np.save"]);
-    place.refuse(npy_of(9, "'<f4'", false, "(0, 8)", &[]), &["header"]);
+    let place = square();
+    refuse(&place, "0.5 0.5 1 0 0 0 -1 9\n", &["not a .npy file", "np.save"]);
+    cast(&place, "--rays rays.npy -o hits.npz");
+    refuse(&place, place.read("hits.npz"), &["archive", "np.save"]);
+    refuse(&place, npy_of(9, "'<f4'", false, "(0, 8)", &[]), &["header"]);
     for header in
         ["", "(", "{}", "{'descr': '<f4'}", "{'descr': 4, 'fortran_order': 1, 'shape': 2}", "\0\u{ff}"]
     {
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
         file.extend((header.len() as u16).to_le_bytes());
         file.extend(header.bytes());
-        place.refuse(file, &["header"]);
+        refuse(&place, file, &["header"]);
     }
     for count in ["-1", "18446744073709551616", "2305843009213693952", "1000000000000"] {
-        place.refuse(npy_of(1, "'<f4'", false, &format!("({count}, 8)"), &[0; 64]), &[]);
+        refuse(&place, npy_of(1, "'<f4'", false, &format!("({count}, 8)"), &[0; 64]), &[]);
     }
-    place.fail("square.obj --rays nowhere.npy -o hits.npz", &["cannot read nowhere.npy"]);
+    fail(&place, "square.obj --rays nowhere.npy -o hits.npz", &["cannot read nowhere.npy"]);
     fs::create_dir(place.path("folder.npy")).expect("created");
-    place.fail("square.obj --rays folder.npy -o hits.npz", &["cannot read folder.npy"]);
+    fail(&place, "square.obj --rays folder.npy -o hits.npz", &["cannot read folder.npy"]);
 }
 
 #[test]
 fn outputs_that_cannot_be_are_refused() {
-    let place = Place::new();
+    let place = square();
     for output in ["hits.npy", "hits", "hits.", "hits.zip"] {
-        place.fail(&format!("square.obj --rays rays.npy -o {output}"), &[output, "hits go to a .npz file"]);
+        fail(&place, &format!("square.obj --rays rays.npy -o {output}"), &[output, "hits go to a .npz file"]);
     }
     fs::create_dir(place.path("folder.npz")).expect("created");
-    place.fail("square.obj --rays rays.npy -o no/hits.npz", &["cannot write no/hits.npz"]);
-    place.fail("square.obj --rays rays.npy -o folder.npz", &["cannot write folder.npz"]);
-    place.fail("square.obj --rays rays.npy -o hits.npz --json no/r.json", &["cannot write no/r.json"]);
-    place.fail("square.obj --rays rays.npy -o a.npz --json a.npz", &["a.npz is named twice"]);
+    fail(&place, "square.obj --rays rays.npy -o no/hits.npz", &["cannot write no/hits.npz"]);
+    fail(&place, "square.obj --rays rays.npy -o folder.npz", &["cannot write folder.npz"]);
+    fail(&place, "square.obj --rays rays.npy -o hits.npz --json no/r.json", &["cannot write no/r.json"]);
+    fail(&place, "square.obj --rays rays.npy -o a.npz --json a.npz", &["a.npz is named twice"]);
     place.write("rays.npz", place.read("rays.npy"));
-    place.fail("square.obj --rays rays.npz -o rays.npz", &["rays.npz is named twice"]);
-    place.fail("square.obj --rays rays.npz -o ./rays.npz", &["rays.npz is named twice"]);
+    fail(&place, "square.obj --rays rays.npz -o rays.npz", &["rays.npz is named twice"]);
+    fail(&place, "square.obj --rays rays.npz -o ./rays.npz", &["rays.npz is named twice"]);
 }
 
 #[test]
 fn options_without_sense_are_refused() {
-    let place = Place::new();
+    let place = square();
     for (option, expected) in [
         ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256"),
         ("--threads 1025", "--threads: 1025"),
         ("--accuracy precise", "--accuracy: \"precise\""),
         ("--profile nowhere", "--profile: there is no"),
     ] {
-        place.fail(&format!("square.obj --rays rays.npy -o hits.npz {option}"), &[expected]);
+        fail(&place, &format!("square.obj --rays rays.npy -o hits.npz {option}"), &[expected]);
     }
-    place.fail("nowhere.obj --rays rays.npy -o hits.npz", &["cannot read nowhere.obj"]);
+    fail(&place, "nowhere.obj --rays rays.npy -o hits.npz", &["cannot read nowhere.obj"]);
     for arguments in
         ["cast", "cast square.obj", "cast square.obj --rays rays.npy", "cast --rays a.npy -o a.npz"]
     {
@@ -401,11 +355,11 @@ fn options_without_sense_are_refused() {
 
 #[test]
 fn what_was_there_before_stays_until_it_is_replaced() {
-    let place = Place::new();
+    let place = square();
     place.write("hits.npz", "precious");
-    place.fail("nowhere.obj --rays rays.npy -o hits.npz", &["nowhere.obj"]);
-    place.refuse("no rays", &[]);
+    fail(&place, "nowhere.obj --rays rays.npy -o hits.npz", &["nowhere.obj"]);
+    refuse(&place, "no rays", &[]);
     assert_eq!(place.read("hits.npz"), b"precious");
-    place.cast("--rays rays.npy -o hits.npz");
+    cast(&place, "--rays rays.npy -o hits.npz");
     assert_eq!(Npz::parse(&place.read("hits.npz")).shape("t"), [CASES.len()]);
 }

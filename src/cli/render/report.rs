@@ -1,5 +1,6 @@
 //! What `render` reports: the scene, the machine's part, and what each frame cost.
 
+use crate::cli::cache_options::CacheReport;
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
 use crate::cli::scene::{Scene, SceneReport};
 use crate::geometry::Accuracy;
@@ -42,12 +43,21 @@ pub struct Report<'a> {
     camera: RayCount,
     shadow: RayCount,
     total: RayCount,
+    /// Of a scene that is not all in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cache: Option<CacheReport>,
     frames: Vec<Shot>,
 }
 
 impl<'a> Report<'a> {
     /// Gathers it. There must be at least one frame.
-    pub fn new(scene: &'a Scene, settings: &RenderSettings, profile: &'a str, frames: Vec<Shot>) -> Self {
+    pub fn new(
+        scene: &'a Scene,
+        settings: &RenderSettings,
+        profile: &'a str,
+        frames: Vec<Shot>,
+        cache: Option<CacheReport>,
+    ) -> Self {
         let sum = |kind: fn(&FrameStats) -> RayCount| {
             let counts = frames.iter().map(|shot| kind(&shot.stats));
             let (rays, seconds) =
@@ -70,6 +80,7 @@ impl<'a> Report<'a> {
             camera: sum(|stats| stats.camera),
             shadow: sum(|stats| stats.shadow),
             total: sum(|stats| stats.total),
+            cache,
             frames,
         }
     }
@@ -107,6 +118,9 @@ impl<'a> Report<'a> {
             if count.rays > 0 {
                 lines.add(kind, rays(&count));
             }
+        }
+        if let Some(cache) = &self.cache {
+            cache.describe(&mut lines);
         }
         lines.add("total", format!("{}, shading included", rays(&self.total)));
         let mut text = lines.text().to_owned();

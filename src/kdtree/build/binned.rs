@@ -7,6 +7,7 @@
 use super::exact::{Event, price};
 use super::reference::Reference;
 use crate::geometry::Aabb;
+use crate::kdtree::params::MOST_BINS;
 use crate::kdtree::sah::{AxisCost, CellCost, Split, cheaper};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
@@ -48,9 +49,6 @@ pub struct Frame {
     bins: usize,
     extent: Aabb,
 }
-
-/// The most bins of an axis.
-pub const MOST_BINS: usize = 1024;
 
 /// Adding it to a small number leaves that number, rounded, in the lowest bits.
 const ROUND: f32 = 8_388_608.0;

@@ -4,7 +4,7 @@
 //! parallel; dividing makes two lists of chunks out of one and frees what it has read, so that hardly
 //! more memory is in use than the references need.
 
-use super::binned::{self, Extent, Frame, MOST_BINS, Table};
+use super::binned::{self, Extent, Frame, Table};
 use super::exact::Event;
 use super::partition::Divider;
 use super::reference::Reference;
@@ -14,6 +14,7 @@ use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::memory::{Ledger, bytes_of};
 use crate::kdtree::node::Node;
+use crate::kdtree::params::MOST_BINS;
 use crate::kdtree::sah::{CellCost, Split};
 use rayon::prelude::*;
 

@@ -7,12 +7,12 @@ use super::engine::{Contender, Engine, Lot, Results, collect};
 use super::report::Beams;
 use crate::error::Result;
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::kdtree::BuildParams;
+use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
-use std::sync::{Mutex, PoisonError};
+use crate::traverse::{Accel, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// raypack with its tree built.
@@ -20,7 +20,7 @@ use std::time::Instant;
 pub struct Ours {
     accel: Accel,
     build_seconds: f64,
-    bytes: u64,
+    stats: TreeStats,
 }
 
 impl Ours {
@@ -37,13 +37,23 @@ impl Ours {
 
     /// The same with a tree that has been built, in so many seconds.
     pub fn of_accel(accel: Accel, build_seconds: f64) -> Self {
-        let bytes = (accel.stats().bytes() + accel.record_bytes()) as u64;
-        Self { accel, build_seconds, bytes }
+        let stats = accel.stats();
+        Self { accel, build_seconds, stats }
     }
 
     /// Seconds that the build took.
     pub fn build_seconds(&self) -> f64 {
         self.build_seconds
+    }
+
+    /// Figures about the tree.
+    pub fn stats(&self) -> &TreeStats {
+        &self.stats
+    }
+
+    /// Bytes of the tree with its triangles.
+    pub fn bytes(&self) -> u64 {
+        (self.stats.bytes() + self.accel.record_bytes()) as u64
     }
 
     /// The built tree.
@@ -104,27 +114,21 @@ impl Ours {
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
     /// chunk, and taken up by whoever comes next: mostly the same worker.
     fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
-        let learnt = std::sync::Arc::new(Mutex::new(Vec::<Dispatch>::new()));
-        let take = |learnt: &Mutex<Vec<Dispatch>>| {
-            learnt.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
-        };
-        let put = |learnt: &Mutex<Vec<Dispatch>>, dispatch| {
-            learnt.lock().unwrap_or_else(PoisonError::into_inner).push(dispatch);
-        };
-        let shared = learnt.clone();
+        let learnt = Arc::new(DispatchPool::default());
+        let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
-            let mut dispatch = take(&shared);
+            let mut dispatch = shared.take();
             for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
                 dispatch.intersect(accel, packets, lanes, out);
             }
-            put(&shared, dispatch);
+            shared.put(dispatch);
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
-            let mut dispatch = take(&learnt);
+            let mut dispatch = learnt.take();
             for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
                 dispatch.occluded(accel, packets, lanes, out);
             }
-            put(&learnt, dispatch);
+            learnt.put(dispatch);
         };
         let lots = Packets::lots(rays, any_hit);
         Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any })
@@ -185,7 +189,7 @@ impl Contender for SliceRun<'_> {
     }
 
     fn bytes(&self) -> u64 {
-        self.engine.bytes
+        self.engine.bytes()
     }
 
     fn trace(&self, chunk: usize) {
@@ -260,7 +264,7 @@ where
     }
 
     fn bytes(&self) -> u64 {
-        self.engine.bytes
+        self.engine.bytes()
     }
 
     fn trace(&self, chunk: usize) {

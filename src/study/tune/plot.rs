@@ -2,15 +2,11 @@
 //! they take beside the best, as measured and as the SAH has it.
 
 use super::report::{Measured, Phase, Report};
-use crate::error::{Error, Result};
-use crate::files::{write_text, write_whole};
-use crate::study::accuracy::tradeoff::plot::{Format, register_font};
+use crate::error::Result;
+use crate::study::plot::{self, Drawing, Drawn, FAMILY};
 use crate::study::text::grouped;
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use std::io;
 use std::path::Path;
 
 /// Width and height of a panel, and of the lines above all.
@@ -30,31 +26,36 @@ struct Curve {
 /// Draws a report and writes the plot: .svg or .png.
 ///
 /// # Errors
-/// The ending is unknown or the file cannot be written; nothing is left behind then.
+/// As [`plot::write`].
 pub fn write(path: &Path, report: &Report) -> Result<()> {
-    let curves = curves(report);
-    let rows = (curves.len() as u32).div_ceil(COLUMNS).max(1);
-    let size = (COLUMNS * PANEL.0, HEADER + rows * PANEL.1);
-    let failed = |message: String| Error::Write { path: path.into(), source: io::Error::other(message) };
-    register_font();
-    match Format::of(path)? {
-        Format::Svg => {
-            let mut text = String::new();
-            let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
-            draw(&area, report, &curves).map_err(|error| failed(error.to_string()))?;
-            drop(area);
-            write_text(path, &text)
+    plot::write(path, &Plot { report, curves: curves(report) })
+}
+
+/// A panel for each curve, and above them what was measured.
+struct Plot<'a> {
+    report: &'a Report,
+    curves: Vec<Curve>,
+}
+
+impl Plot<'_> {
+    fn rows(&self) -> u32 {
+        (self.curves.len() as u32).div_ceil(COLUMNS).max(1)
+    }
+}
+
+impl Drawing for Plot<'_> {
+    fn size(&self) -> (u32, u32) {
+        (COLUMNS * PANEL.0, HEADER + self.rows() * PANEL.1)
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn {
+        area.fill(&WHITE)?;
+        let (header, panels) = area.split_vertically(HEADER);
+        for (i, (line, size)) in lines(self.report).into_iter().zip([19, 12, 12]).enumerate() {
+            header.draw(&Text::new(line, (14, 10 + 24 * i as i32), (FAMILY, size)))?;
         }
-        Format::Png => {
-            let mut bytes = vec![0; (size.0 * size.1 * 3) as usize];
-            let area = BitMapBackend::with_buffer(&mut bytes, size).into_drawing_area();
-            draw(&area, report, &curves).map_err(|error| failed(error.to_string()))?;
-            drop(area);
-            write_whole(path, |out| {
-                let png = PngEncoder::new(out);
-                png.write_image(&bytes, size.0, size.1, ExtendedColorType::Rgb8).map_err(io::Error::other)
-            })
-        }
+        let cells = panels.split_evenly((self.rows() as usize, COLUMNS as usize));
+        self.curves.iter().zip(&cells).try_for_each(|(curve, cell)| panel(cell, curve))
     }
 }
 
@@ -79,16 +80,10 @@ fn curves(report: &Report) -> Vec<Curve> {
     curves.filter(|curve| curve.points.len() > 1).collect()
 }
 
-type Drawn<B> = std::result::Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
-
-fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, report: &Report, curves: &[Curve]) -> Drawn<B>
-where
-    B::ErrorType: 'static,
-{
-    area.fill(&WHITE)?;
-    let (header, panels) = area.split_vertically(HEADER);
+/// The lines above the panels.
+fn lines(report: &Report) -> [String; 3] {
     let name = Path::new(&report.model).file_name().map(|n| n.to_string_lossy().into_owned());
-    let lines = [
+    [
         format!("What settings are worth: {}", name.as_deref().unwrap_or(&report.model)),
         format!(
             "{} triangles; {} at {}, goal {}; {}, {} threads, {}, raypack {} ({} build), {}",
@@ -104,23 +99,14 @@ where
             report.date
         ),
         "blue: time beside the best, middle and spread of the pairs; orange: what the SAH says".into(),
-    ];
-    for (i, (line, size)) in lines.iter().zip([19, 12, 12]).enumerate() {
-        header.draw(&Text::new(line.clone(), (14, 10 + 24 * i as i32), ("sans-serif", size)))?;
-    }
-    let rows = (curves.len() as u32).div_ceil(COLUMNS).max(1);
-    let cells = panels.split_evenly((rows as usize, COLUMNS as usize));
-    curves.iter().zip(&cells).try_for_each(|(curve, cell)| panel(cell, curve))
+    ]
 }
 
-fn panel<B: DrawingBackend>(area: &DrawingArea<B, Shift>, curve: &Curve) -> Drawn<B>
-where
-    B::ErrorType: 'static,
-{
+fn panel<B: DrawingBackend>(area: &DrawingArea<B, Shift>, curve: &Curve) -> Drawn {
     let [low, high] = extent(curve);
     let last = curve.points.len() as f64 - 1.0;
     let mut chart = ChartBuilder::on(area)
-        .caption(curve.setting, ("sans-serif", 14))
+        .caption(curve.setting, (FAMILY, 14))
         .margin(8)
         .x_label_area_size(24)
         .y_label_area_size(44)
@@ -136,7 +122,7 @@ where
         .x_labels(2 * curve.points.len() + 1)
         .x_label_formatter(&label)
         .y_label_formatter(&|y| format!("{y:.2}"))
-        .label_style(("sans-serif", 11))
+        .label_style((FAMILY, 11))
         .draw()?;
     let at = |i: usize| i as f64;
     let points = || curve.points.iter().enumerate();

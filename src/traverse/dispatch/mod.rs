@@ -8,12 +8,15 @@
 //! on the choice: hits are the same, bit for bit.
 
 mod choice;
+mod pool;
+
+pub use pool::DispatchPool;
 
 use super::accel::Accel;
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
+use super::stopwatch::Stopwatch;
 use choice::Choice;
-use std::time::Instant;
 
 /// The kernels that it chooses among.
 const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
@@ -40,7 +43,7 @@ impl Dispatch {
         active: &[u32],
         hits: &mut [HitPacket<16>],
     ) {
-        timed(&mut self.closest, active, |kernel| match kernel {
+        timed(accel, &mut self.closest, active, |kernel| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => {
                 for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
@@ -57,7 +60,7 @@ impl Dispatch {
 
     /// As [`Accel::occluded_tile`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
-        timed(&mut self.any, active, |kernel| match kernel {
+        timed(accel, &mut self.any, active, |kernel| match kernel {
             Kernel::Tile => accel.occluded_tile(rays, active, occluded),
             Kernel::Packet8 => {
                 for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
@@ -80,14 +83,14 @@ impl Dispatch {
 
 /// Has a kernel trace the lanes in `active`, and takes note of how long that took.
 #[inline(always)]
-fn timed(choice: &mut Choice<{ WAYS.len() }>, active: &[u32], trace: impl FnOnce(Kernel)) {
+fn timed(accel: &Accel, choice: &mut Choice<{ WAYS.len() }>, active: &[u32], trace: impl FnOnce(Kernel)) {
     let rays: u32 = active.iter().map(|lanes| lanes.count_ones()).sum();
     if rays < LEAST_RAYS {
         trace(WAYS[choice.quickest()]);
         return;
     }
     let way = choice.next();
-    let start = Instant::now();
+    let start = Stopwatch::start(accel);
     trace(WAYS[way]);
-    choice.record(way, u64::from(rays), start.elapsed());
+    choice.record(way, u64::from(rays), start.elapsed(accel));
 }

@@ -3,9 +3,9 @@
 use super::{Answers, Any, Closest, trace};
 use crate::geometry::triangle::{Exact, Fast, Mode, Watertight};
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::kdtree::KdTree;
 use crate::simd::{Simd, Task};
 use crate::traverse::Accel;
+use crate::traverse::records::Resident;
 
 impl Accel {
     /// The closest hit of each ray, traced with many in flight.
@@ -19,24 +19,23 @@ impl Accel {
     }
 
     fn stream<A: Answers>(&self, rays: &[Ray], answers: A) {
-        let tree = &*self.tree;
+        let tree = self.tree();
+        let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
             Accuracy::Fast => {
-                self.chosen.run(Stream::<Fast, A> { tree, records: &self.projected, rays, answers })
+                let tree = Resident { tree, records: &self.projected };
+                self.chosen.run(Stream::<Fast, A> { tree, rays, answers });
             }
             Accuracy::Watertight => {
-                self.chosen.run(Stream::<Watertight, A> { tree, records: tree.triangles(), rays, answers })
+                self.chosen.run(Stream::<Watertight, A> { tree: triangles, rays, answers });
             }
-            Accuracy::Exact => {
-                self.chosen.run(Stream::<Exact, A> { tree, records: tree.triangles(), rays, answers })
-            }
+            Accuracy::Exact => self.chosen.run(Stream::<Exact, A> { tree: triangles, rays, answers }),
         }
     }
 }
 
 struct Stream<'a, M: Mode, A> {
-    tree: &'a KdTree,
-    records: &'a [M::Record],
+    tree: Resident<'a, M::Record>,
     rays: &'a [Ray],
     answers: A,
 }
@@ -47,6 +46,6 @@ impl<M: Mode, A: Answers> Task for Stream<'_, M, A> {
     #[inline(always)]
     fn run<S: Simd>(mut self) {
         // Rays have numbers of 32 bits.
-        trace::<S, _, M, A>(self.tree, self.records, self.rays, &mut self.answers);
+        trace::<S, M, A>(&self.tree, self.rays, &mut self.answers);
     }
 }

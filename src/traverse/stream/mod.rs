@@ -24,9 +24,10 @@ mod step;
 
 use super::lanes::RayPacket;
 use super::packet;
+use super::records::Resident;
 use crate::geometry::triangle::{self, Mode, Test};
 use crate::geometry::{Hit, Ray};
-use crate::kdtree::{Exit, Tree};
+use crate::kdtree::{Exit, KdTree, Tree};
 use crate::simd::{Simd, prefetch};
 use flight::{Flight, Group, NONE};
 use std::cell::Cell;
@@ -42,13 +43,13 @@ pub trait Answers {
     const ANY: bool;
 
     /// A ray's answer: the closest hit that was found, or any.
-    fn found<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], flight: &Flight<M::Alone>);
+    fn found<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>);
 
     /// A ray that hits nothing.
     fn missed(&mut self, ray: usize);
 
     /// A ray that the packet kernel has to trace.
-    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]);
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]);
 }
 
 /// Records of closest hits.
@@ -58,8 +59,8 @@ impl Answers for Closest<'_> {
     const ANY: bool = false;
 
     #[inline(always)]
-    fn found<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], flight: &Flight<M::Alone>) {
-        let record = &records[flight.primitive as usize];
+    fn found<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>) {
+        let record = &tree.records[flight.primitive as usize];
         let [u, v] = M::Alone::weights(record, flight.weights[0], flight.weights[1]);
         // A zero is given out without a sign.
         self.0[flight.ray as usize] = Hit {
@@ -78,9 +79,9 @@ impl Answers for Closest<'_> {
 
     #[cold]
     #[inline(never)]
-    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]) {
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]) {
         let rays = RayPacket::of_slice(&[rays[ray]]);
-        self.0[ray] = packet::intersect::<1, f32, T, M>(tree, records, &rays, 1).get(0);
+        self.0[ray] = packet::intersect::<1, f32, _, M>(tree, &rays, 1).get(0);
     }
 }
 
@@ -91,7 +92,7 @@ impl Answers for Any<'_> {
     const ANY: bool = true;
 
     #[inline(always)]
-    fn found<T: Tree, M: Mode>(&mut self, _tree: &T, _records: &[M::Record], flight: &Flight<M::Alone>) {
+    fn found<M: Mode>(&mut self, _tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>) {
         self.0[flight.ray as usize] = true;
     }
 
@@ -102,9 +103,9 @@ impl Answers for Any<'_> {
 
     #[cold]
     #[inline(never)]
-    fn odd<T: Tree, M: Mode>(&mut self, tree: &T, records: &[M::Record], ray: usize, rays: &[Ray]) {
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]) {
         let rays = RayPacket::of_slice(&[rays[ray]]);
-        self.0[ray] = packet::occluded::<1, f32, T, M>(tree, records, &rays, 1) == 1;
+        self.0[ray] = packet::occluded::<1, f32, _, M>(tree, &rays, 1) == 1;
     }
 }
 
@@ -155,7 +156,7 @@ impl Lists {
 
     /// Puts a ray on the list for the exit that it takes, and fetches what it will need.
     #[inline(always)]
-    fn route<T: Tree>(&mut self, tree: &T, flight: usize, exit: i32) {
+    fn route(&mut self, tree: &KdTree, flight: usize, exit: i32) {
         let ended = exit == END;
         let exit = Exit(exit);
         self.lines.push_if(flight, !exit.is_leaf());
@@ -174,27 +175,26 @@ thread_local! {
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
-pub fn trace<S: Simd, T: Tree, M: Mode, A: Answers>(
-    tree: &T,
-    records: &[M::Record],
+pub fn trace<S: Simd, M: Mode, A: Answers>(
+    resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
 ) {
     // Taken out, not borrowed: a closure would be compiled without the instruction set.
     let mut stacks = STACKS.take();
     stacks.resize(IN_FLIGHT, Waiting::new());
-    fly::<S, T, M, A>(tree, records, rays, answers, &mut stacks);
+    fly::<S, M, A>(resident, rays, answers, &mut stacks);
     STACKS.set(stacks);
 }
 
 #[inline(always)]
-fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
-    tree: &T,
-    records: &[M::Record],
+fn fly<S: Simd, M: Mode, A: Answers>(
+    resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
     stacks: &mut [Waiting],
 ) {
+    let Resident { tree, records } = *resident;
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
     let (mut one, mut other) = (Lists::new(), Lists::new());
@@ -212,7 +212,7 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
             for (lane, ray) in eight.iter().enumerate() {
                 let number = ahead + lane;
                 if group.odd >> lane & 1 == 1 || !plain {
-                    answers.odd::<T, M>(tree, records, number, rays);
+                    answers.odd::<M>(resident, number, rays);
                 } else if group.flies >> lane & 1 == 0 {
                     answers.missed(number);
                 } else {
@@ -282,7 +282,7 @@ fn fly<S: Simd, T: Tree, M: Mode, A: Answers>(
             if flight.primitive == NONE {
                 answers.missed(flight.ray as usize);
             } else {
-                answers.found::<T, M>(tree, records, flight);
+                answers.found::<M>(resident, flight);
             }
             free.push(k);
         }

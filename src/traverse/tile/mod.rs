@@ -34,6 +34,7 @@ use super::lanes::{HitPacket, RayPacket};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
 use crate::simd::{Lanes, Simd};
+use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
 use form::{Form, Seen};
 use nearest::Nearest;
@@ -46,44 +47,41 @@ const FEW: u32 = 1;
 /// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
 /// `false`, and nothing done, if the rays are no beam from one point.
 #[inline(always)]
-pub fn intersect<S: Simd, T: Tree, M: Mode, P: Probe>(
+pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
-    records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
 ) -> bool {
     if S::NATIVE == 16 {
-        nearest::<S::F16, S::F16, T, M, P, 16>(tree, records, rays, active, hits, probe)
+        nearest::<S::F16, S::F16, T, M, P, 16>(tree, rays, active, hits, probe)
     } else {
-        nearest::<S::F16, S::F8, T, M, P, 8>(tree, records, rays, active, hits, probe)
+        nearest::<S::F16, S::F8, T, M, P, 8>(tree, rays, active, hits, probe)
     }
 }
 
 /// The lanes in `active` that hit anything, packet by packet. `false`, and nothing done, if the rays
 /// are no beam.
 #[inline(always)]
-pub fn occluded<S: Simd, T: Tree, M: Mode, P: Probe>(
+pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
-    records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     found: &mut [u32],
     probe: &mut P,
 ) -> bool {
     if S::NATIVE == 16 {
-        shadows::<S::F16, S::F16, T, M, P, 16>(tree, records, rays, active, found, probe)
+        shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, active, found, probe)
     } else {
-        shadows::<S::F16, S::F8, T, M, P, 8>(tree, records, rays, active, found, probe)
+        shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, active, found, probe)
     }
 }
 
 /// [`intersect`] with `N` rays to a register.
 #[inline(always)]
-fn nearest<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize>(
+fn nearest<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
-    records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
@@ -95,7 +93,7 @@ fn nearest<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize
     let Some((Form::From, frame)) = form::guess(rays, active) else { return false };
     let Some(extent) = form::from_apex::<L>(&frame, rays, active) else { return false };
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
-    let mut bundle = Nearest::<L, R, T, M, N>::new(tree, records, rays, active, &beam);
+    let mut bundle = Nearest::<L, R, T, M, N>::new(tree, rays, active, &beam);
     Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
     for (packet, hits) in hits.iter_mut().enumerate() {
         bundle.give(packet, hits);
@@ -105,9 +103,8 @@ fn nearest<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize
 
 /// [`occluded`] with `N` rays to a register.
 #[inline(always)]
-fn shadows<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize>(
+fn shadows<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
-    records: &[M::Record],
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
     found: &mut [u32],
@@ -121,7 +118,7 @@ fn shadows<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize
     let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, active, &mut seen) else {
         return false;
     };
-    let trace = Trace { tree, records, rays, active, frame, extent, spread };
+    let trace = Trace { tree, rays, active, frame, extent, spread };
     let open = if form == Form::Along {
         trace.shadows::<R, M, P, N, true>(&mut seen, probe)
     } else {
@@ -134,9 +131,8 @@ fn shadows<L: Lanes<16>, R: Lanes<N>, T: Tree, M: Mode, P: Probe, const N: usize
 }
 
 /// Rays that are known to be a beam.
-struct Trace<'a, L, T, K> {
+struct Trace<'a, L, T> {
     tree: &'a T,
-    records: &'a [K],
     rays: &'a [RayPacket<16>],
     active: &'a [u32; PACKETS],
     frame: Frame,
@@ -144,7 +140,7 @@ struct Trace<'a, L, T, K> {
     spread: Spread,
 }
 
-impl<L: Lanes<16>, T: Tree, K> Trace<'_, L, T, K> {
+impl<L: Lanes<16>, T: Tree> Trace<'_, L, T> {
     /// The lanes that find nothing.
     #[inline(always)]
     fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(
@@ -154,13 +150,13 @@ impl<L: Lanes<16>, T: Tree, K> Trace<'_, L, T, K> {
     ) -> [u32; PACKETS]
     where
         R: Lanes<N>,
-        M: Mode<Record = K>,
+        M: Mode,
+        T: Records<M>,
         P: Probe,
     {
-        let Self { tree, records, rays, active, frame, ref extent, spread } = *self;
+        let Self { tree, rays, active, frame, ref extent, spread } = *self;
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
-        let mut bundle =
-            Shadows::<L, R, T, M, N, PARALLEL>::new(tree, records, rays, active, seen, &interval);
+        let mut bundle = Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, seen, &interval);
         Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
         bundle.open
     }

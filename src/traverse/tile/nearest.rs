@@ -5,12 +5,12 @@ use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3};
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
-use crate::kdtree::Tree;
 use crate::simd::Lanes;
 use crate::simd::Mask;
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::{HitPacket, RayPacket};
 use crate::traverse::packet::descend;
+use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk};
 
 /// Most parts that sixteen packets are traced in: halves, where registers hold eight lanes.
@@ -30,11 +30,10 @@ pub struct Nearest<'a, L, R, T, M, const N: usize>
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     tree: &'a T,
-    records: &'a [M::Record],
     rays: &'a [RayPacket<16>],
     /// Which lanes of each packet count.
     active: &'a [u32; PACKETS],
@@ -51,21 +50,19 @@ impl<'a, L, R, T, M, const N: usize> Nearest<'a, L, R, T, M, N>
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     /// The rays at their start.
     #[inline(always)]
     pub fn new(
         tree: &'a T,
-        records: &'a [M::Record],
         rays: &'a [RayPacket<16>],
         active: &'a [u32; PACKETS],
         beam: &'a Beam<L, false>,
     ) -> Self {
         let mut bundle = Self {
             tree,
-            records,
             rays,
             active,
             beam,
@@ -112,8 +109,7 @@ where
         for part in 0..16 / N {
             let test = self.part_test(packet, part);
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
-            let found =
-                self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, self.records, again);
+            let found = self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, again);
             hits.set_part(part, &found);
         }
     }
@@ -135,7 +131,7 @@ impl<L, R, T, M, const N: usize> Bundle<L> for Nearest<'_, L, R, T, M, N>
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     // Half of this lost up to 7 % in interiors, and twice as much gained 3 % there and lost 10 % among small
@@ -150,7 +146,7 @@ where
     #[inline(always)]
     fn place(&mut self, lane: usize, primitive: u32, block: &Block) {
         let frame = &self.beam.frame;
-        let record = &self.records[primitive as usize];
+        let record = self.tree.record_of(primitive);
         self.placed[lane & 15] =
             M::Test::<N, R>::place(record, &frame.apex, frame.axes[2], frame.sign, &block.edges_of(lane));
     }
@@ -169,7 +165,7 @@ where
             for triangle in bits(chosen) {
                 let primitive = primitives[triangle];
                 let placed = &self.placed[triangle & 15];
-                let candidate = test.test_placed(&self.records[primitive as usize], placed, live);
+                let candidate = test.test_placed(self.tree.record_of(primitive), placed, live);
                 part_changed |=
                     closest.take::<false>(&candidate, primitive, tnear, live, !M::Test::<N, R>::DEFERS);
             }
@@ -200,16 +196,7 @@ where
                 let test = self.part_test(packet, part);
                 let tnear = R::load(&rays.tnear);
                 let node = self.tree.beneath(place);
-                descend::<N, R, T, M, false>(
-                    self.tree,
-                    self.records,
-                    &walk,
-                    &test,
-                    tnear,
-                    node,
-                    interval,
-                    &mut closest,
-                );
+                descend::<N, R, T, M, false>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
                 self.closest[packet * (16 / N) + part] = closest;
                 changed = true;
             }

@@ -63,6 +63,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
                 nodes += 1;
                 probe.node(live.count_ones());
                 if node.is_leaf() {
+                    tree.enter_page(node);
                     self.visit(bundle, tree.page(node), &interval, live, probe);
                     break;
                 }

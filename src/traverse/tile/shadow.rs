@@ -11,12 +11,13 @@ use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
-use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::RayPacket;
 use crate::traverse::packet::descend;
+use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk};
+use std::marker::PhantomData;
 
 /// A triangle as the beam sees it, in the form of an outline.
 #[derive(Clone, Copy, Default)]
@@ -31,11 +32,10 @@ pub struct Shadows<'a, L, R, T, M, const N: usize, const PARALLEL: bool>
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     tree: &'a T,
-    records: &'a [M::Record],
     rays: &'a [RayPacket<16>],
     seen: &'a Seen,
     /// The lanes of each packet that have found nothing yet.
@@ -43,21 +43,20 @@ where
     /// The depth beyond which no ray of a packet looks for anything any more.
     reach: [f32; PACKETS],
     placed: [Placed; 16],
-    widths: std::marker::PhantomData<(L, R)>,
+    types: PhantomData<(L, R, M)>,
 }
 
 impl<'a, L, R, T, M, const N: usize, const PARALLEL: bool> Shadows<'a, L, R, T, M, N, PARALLEL>
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     /// The rays at their start, in `interval`, beyond which nothing is.
     #[inline(always)]
     pub fn new(
         tree: &'a T,
-        records: &'a [M::Record],
         rays: &'a [RayPacket<16>],
         active: &[u32; PACKETS],
         seen: &'a mut Seen,
@@ -72,16 +71,7 @@ where
                 *part_mut(&mut seen.far[packet], part) = far.store();
             }
         }
-        Self {
-            tree,
-            records,
-            rays,
-            seen,
-            open: *active,
-            reach,
-            placed: [Placed::default(); 16],
-            widths: std::marker::PhantomData,
-        }
+        Self { tree, rays, seen, open: *active, reach, placed: [Placed::default(); 16], types: PhantomData }
     }
 
     /// The mode's own test, of the lanes in `doubtful`.
@@ -93,7 +83,7 @@ where
             &load_part3::<N, R>(&rays.direction, part),
             doubtful.bits(),
         );
-        let candidate = test.test(&self.records[primitive as usize], doubtful);
+        let candidate = test.test(self.tree.record_of(primitive), doubtful);
         // As a packet's closest hit is taken, which is none beyond the greatest float.
         let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
         let tnear = load_part::<N, R>(&rays.tnear, part);
@@ -120,7 +110,7 @@ impl<L, R, T, M, const N: usize, const PARALLEL: bool> Bundle<L> for Shadows<'_,
 where
     L: Lanes<16>,
     R: Lanes<N>,
-    T: Tree,
+    T: Records<M>,
     M: Mode,
 {
     // Twice as much lost up to 10 % in interiors, and half of it as much on some.
@@ -228,16 +218,7 @@ where
                     lanes,
                 );
                 let (tnear, node) = (R::load(&rays.tnear), self.tree.beneath(place));
-                descend::<N, R, T, M, true>(
-                    self.tree,
-                    self.records,
-                    &walk,
-                    &test,
-                    tnear,
-                    node,
-                    interval,
-                    &mut closest,
-                );
+                descend::<N, R, T, M, true>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
                 self.close(packet, part, closest.found() & lanes);
             }
         }

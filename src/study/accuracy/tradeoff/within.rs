@@ -69,6 +69,8 @@ mod tests {
             total: none,
             seconds: 0.0,
             tiles: 1,
+            tile_p50: 0.0,
+            tile_p99: 0.0,
             threads: 1,
             pinned: 0,
         };

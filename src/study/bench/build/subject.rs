@@ -122,12 +122,11 @@ impl Subject {
                 let ours = Ours::new(mesh, params, options.isa, options.accuracy)?;
                 let accel = ours.accel().clone();
                 Built {
-                    bytes: (accel.stats().bytes() + accel.record_bytes()) as u64,
                     announced: Some(params.peak_bytes(mesh.triangles.len()) as u64),
                     counted: Some(accel.tree().build_peak() as u64),
-                    stats: Some(accel.stats()),
+                    stats: Some(ours.stats().clone()),
                     accel: Some(accel),
-                    ..Built::new(self, ours.build_seconds(), 0, Box::new(ours))
+                    ..Built::new(self, ours.build_seconds(), ours.bytes(), Box::new(ours))
                 }
             }
             #[cfg(feature = "peers")]

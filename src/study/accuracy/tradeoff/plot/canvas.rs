@@ -1,30 +1,12 @@
 //! Lines, marks and text in units of the layout, on any of plotters' backends.
 
+use crate::study::plot::{Drawn, FAMILY};
 use plotters::backend::DrawingBackend;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, PathElement, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{
-    Color, FontStyle, FontTransform, IntoFont, IntoTextStyle, RGBColor, register_font as register,
-};
-use std::sync::Once;
-
-const FAMILY: &str = "sans-serif";
-
-/// Gives plotters DejaVu Sans for "sans-serif": without a font it draws no text into bitmaps, and measures none.
-/// [`write`](super::write) does so by itself; other users of plotters in a process have need of it too.
-pub fn register_font() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let known = register(FAMILY, FontStyle::Normal, dejavu::sans::regular());
-        assert!(known.is_ok(), "DejaVu Sans is a font");
-    });
-}
-
-/// Why something could not be drawn.
-#[derive(Debug)]
-pub struct Failure(pub String);
+use plotters::style::{Color, FontTransform, IntoFont, IntoTextStyle, RGBColor};
 
 /// A rectangle of the layout.
 #[derive(Clone, Copy, Debug)]
@@ -93,8 +75,6 @@ pub struct Canvas<'a, B: DrawingBackend> {
     scale: f64,
 }
 
-type Drawn = Result<(), Failure>;
-
 impl<'a, B: DrawingBackend> Canvas<'a, B> {
     /// A canvas of `scale` pixels a unit.
     pub fn new(area: &'a DrawingArea<B, Shift>, scale: u32) -> Self {
@@ -103,7 +83,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
 
     /// Makes all of it white.
     pub fn clear(&self) -> Drawn {
-        self.area.fill(&plotters::style::WHITE).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.fill(&plotters::style::WHITE)?)
     }
 
     fn pixel(&self, (x, y): (f64, f64)) -> (i32, i32) {
@@ -118,7 +98,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     pub fn line(&self, points: &[(f64, f64)], width: f64, ink: Ink) -> Drawn {
         let pixels: Vec<(i32, i32)> = points.iter().map(|&p| self.pixel(p)).collect();
         let style = ink.rgb().stroke_width(self.length(width));
-        self.area.draw(&PathElement::new(pixels, style)).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.draw(&PathElement::new(pixels, style))?)
     }
 
     /// A dashed straight line.
@@ -139,20 +119,20 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     pub fn fill(&self, area: Area, ink: Ink) -> Drawn {
         let corners = [(area.left, area.top), (area.left + area.width, area.top + area.height)];
         let rectangle = Rectangle::new(corners.map(|p| self.pixel(p)), ink.rgb().filled());
-        self.area.draw(&rectangle).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.draw(&rectangle)?)
     }
 
     /// A filled circle.
     pub fn disc(&self, center: (f64, f64), radius: f64, ink: Ink) -> Drawn {
         let circle = Circle::new(self.pixel(center), self.length(radius), ink.rgb().filled());
-        self.area.draw(&circle).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.draw(&circle)?)
     }
 
     /// A circle's line.
     pub fn ring(&self, center: (f64, f64), radius: f64, ink: Ink) -> Drawn {
         let style = ink.rgb().stroke_width(self.length(1.5));
         let circle = Circle::new(self.pixel(center), self.length(radius), style);
-        self.area.draw(&circle).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.draw(&circle)?)
     }
 
     /// A line of text, `size` units high.
@@ -182,6 +162,6 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         let font = (FAMILY, size * self.scale).into_font().transform(turned).color(&ink.rgb());
         let style = font.into_text_style(self.area).pos(Pos::new(along, VPos::Center));
         let text = Text::new(text.to_owned(), self.pixel(at), style);
-        self.area.draw(&text).map_err(|e| Failure(e.to_string()))
+        Ok(self.area.draw(&text)?)
     }
 }

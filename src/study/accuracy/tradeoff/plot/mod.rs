@@ -3,31 +3,24 @@
 //! A panel for each kind of ray (nanoseconds a ray against errors per million rays, raypack's modes and
 //! Embree's) and one for frames (milliseconds against the picture's RMSE, a line a mode, a point a number of
 //! samples). Errors stand on a logarithmic axis with a place of its own for none at all.
-//!
-//! An SVG names the generic family "sans-serif" and is laid out without any font; a PNG is drawn with DejaVu
-//! Sans, which is compiled in. So both work on a machine without fonts.
 
 mod axis;
 mod canvas;
 mod labels;
 mod panel;
 
-pub use canvas::register_font;
-
 use super::report::{FrameRow, RayRow, Report};
-use crate::error::{Error, Result};
-use crate::files::{write_text, write_whole};
+use crate::error::Result;
 use crate::geometry::Accuracy;
+use crate::study::plot::{self, Drawing, Drawn, Format};
 use crate::study::rays::RayKind;
 use crate::study::text::grouped;
 use axis::{Axis, ErrorAxis};
-use canvas::{Anchor, Area, Canvas, Failure, Ink};
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use canvas::{Anchor, Area, Canvas, Ink};
 use panel::{Mark, Panel, Point};
-use plotters::backend::{BitMapBackend, SVGBackend};
-use plotters::drawing::IntoDrawingArea;
-use std::io;
+use plotters::backend::DrawingBackend;
+use plotters::coord::Shift;
+use plotters::drawing::DrawingArea;
 use std::path::Path;
 
 /// Pixels of a PNG for each unit of the layout.
@@ -40,111 +33,105 @@ const COLUMNS: u32 = 3;
 const HEADER: u32 = 84;
 const FOOTER: u32 = 44;
 
-/// The kinds of plot that can be written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Scalable, with text as text.
-    Svg,
-    /// Pixels.
-    Png,
-}
-
-impl Format {
-    /// The format that a path's ending names, in upper or lower case.
-    ///
-    /// # Errors
-    /// [`Error::UnknownFormat`].
-    pub fn of(path: &Path) -> Result<Self> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        match ending.as_deref() {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(Error::UnknownFormat { path: path.into(), expected: "a plot is a .svg or .png file" }),
-        }
-    }
-}
-
-/// Draws a report and writes the plot.
+/// Draws a report and writes the plot: .svg or .png.
 ///
 /// # Errors
-/// The ending is unknown or the file cannot be written; nothing is left behind then.
+/// As [`plot::write`].
 pub fn write(path: &Path, report: &Report) -> Result<()> {
-    let panels = panels(report);
-    let size = size(panels.len() as u32);
-    let failed = |failure: Failure| Error::Write { path: path.into(), source: io::Error::other(failure.0) };
-    match Format::of(path)? {
-        Format::Svg => {
-            let mut text = String::new();
-            let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
-            draw(&Canvas::new(&area, 1), size, report, &panels).map_err(failed)?;
-            drop(area);
-            write_text(path, &text)
+    let scale = match Format::of(path)? {
+        Format::Svg => 1,
+        Format::Png => PNG_SCALE,
+    };
+    plot::write(path, &Plot { report, panels: panels(report), scale })
+}
+
+/// A report's panels, and above and below them what they say.
+struct Plot<'a> {
+    report: &'a Report,
+    panels: Vec<Panel>,
+    /// Pixels for each unit of the layout.
+    scale: u32,
+}
+
+impl Plot<'_> {
+    fn columns(&self) -> u32 {
+        // The header's lines want the width of two panels.
+        (self.panels.len() as u32).clamp(2, COLUMNS)
+    }
+
+    /// Width and height in units of the layout.
+    fn extent(&self) -> (u32, u32) {
+        let rows = (self.panels.len() as u32).div_ceil(self.columns());
+        (self.columns() * PANEL.0, HEADER + rows * PANEL.1 + FOOTER)
+    }
+
+    /// What was measured, on which machine.
+    fn header(&self, canvas: &Canvas<'_, impl DrawingBackend>) -> Drawn {
+        let h = &self.report.header;
+        let middle = f64::from(self.extent().0) / 2.0;
+        let name =
+            Path::new(&h.model).file_name().map_or(h.model.clone(), |n| n.to_string_lossy().into_owned());
+        canvas.text(
+            &format!("What accuracy costs: {name}"),
+            (middle, 24.0),
+            20.0,
+            Ink::Text,
+            Anchor::Middle,
+        )?;
+        let plural = if h.threads == 1 { "" } else { "s" };
+        let engines: Vec<String> =
+            h.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
+        let lines = [
+            format!(
+                "{} triangles, {}, {} thread{plural}, {} build",
+                grouped(h.triangles as u64),
+                engines.join(", "),
+                h.threads,
+                h.build
+            ),
+            format!("{}, {}, camera {}, seed {}", h.machine, &h.date[..10], h.camera, h.seed),
+        ];
+        for (line, y) in lines.iter().zip([48.0, 66.0]) {
+            canvas.text(line, (middle, y), 12.0, Ink::Faint, Anchor::Middle)?;
         }
-        Format::Png => {
-            register_font();
-            let (width, height) = (size.0 * PNG_SCALE, size.1 * PNG_SCALE);
-            let mut bytes = vec![0; (width * height * 3) as usize];
-            let area = BitMapBackend::with_buffer(&mut bytes, (width, height)).into_drawing_area();
-            draw(&Canvas::new(&area, PNG_SCALE), size, report, &panels).map_err(failed)?;
-            drop(area);
-            write_whole(path, |out| {
-                let png = PngEncoder::new(out);
-                png.write_image(&bytes, width, height, ExtendedColorType::Rgb8).map_err(io::Error::other)
-            })
-        }
+        Ok(())
+    }
+
+    /// How to read the panels.
+    fn footer(&self, canvas: &Canvas<'_, impl DrawingBackend>) -> Drawn {
+        let (width, height) = self.extent();
+        let (middle, bottom) = (f64::from(width) / 2.0, f64::from(height));
+        let legend = "Lower left is better. Ring: raypack's default. Dashes: Pareto front. \
+                      Bars: quickest to slowest round.";
+        canvas.text(legend, (middle, bottom - 28.0), 12.0, Ink::Faint, Anchor::Middle)?;
+        let legend = "Errors: missed and false hits and wrong primitives, against exact arithmetic.";
+        canvas.text(legend, (middle, bottom - 12.0), 12.0, Ink::Faint, Anchor::Middle)
     }
 }
 
-fn size(panels: u32) -> (u32, u32) {
-    // The header's lines want the width of two panels.
-    let columns = panels.clamp(2, COLUMNS);
-    (columns * PANEL.0, HEADER + panels.div_ceil(columns) * PANEL.1 + FOOTER)
-}
+impl Drawing for Plot<'_> {
+    fn size(&self) -> (u32, u32) {
+        let (width, height) = self.extent();
+        (width * self.scale, height * self.scale)
+    }
 
-fn draw(
-    canvas: &Canvas<'_, impl plotters::backend::DrawingBackend>,
-    size: (u32, u32),
-    report: &Report,
-    panels: &[Panel],
-) -> std::result::Result<(), Failure> {
-    canvas.clear()?;
-    let h = &report.header;
-    let middle = f64::from(size.0) / 2.0;
-    let name = Path::new(&h.model).file_name().map_or(h.model.clone(), |n| n.to_string_lossy().into_owned());
-    canvas.text(&format!("What accuracy costs: {name}"), (middle, 24.0), 20.0, Ink::Text, Anchor::Middle)?;
-    let plural = if h.threads == 1 { "" } else { "s" };
-    let engines: Vec<String> =
-        h.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
-    let lines = [
-        format!(
-            "{} triangles, {}, {} thread{plural}, {} build",
-            grouped(h.triangles as u64),
-            engines.join(", "),
-            h.threads,
-            h.build
-        ),
-        format!("{}, {}, camera {}, seed {}", h.machine, &h.date[..10], h.camera, h.seed),
-    ];
-    for (line, y) in lines.iter().zip([48.0, 66.0]) {
-        canvas.text(line, (middle, y), 12.0, Ink::Faint, Anchor::Middle)?;
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn {
+        let canvas = &Canvas::new(area, self.scale);
+        canvas.clear()?;
+        self.header(canvas)?;
+        let columns = self.columns();
+        for (i, panel) in (0..).zip(&self.panels) {
+            let (column, row) = (i % columns, i / columns);
+            let area = Area {
+                left: f64::from(column * PANEL.0),
+                top: f64::from(HEADER + row * PANEL.1),
+                width: f64::from(PANEL.0),
+                height: f64::from(PANEL.1),
+            };
+            panel.draw(canvas, area)?;
+        }
+        self.footer(canvas)
     }
-    let columns = size.0 / PANEL.0;
-    for (i, panel) in (0..).zip(panels) {
-        let (column, row) = (i % columns, i / columns);
-        let area = Area {
-            left: f64::from(column * PANEL.0),
-            top: f64::from(HEADER + row * PANEL.1),
-            width: f64::from(PANEL.0),
-            height: f64::from(PANEL.1),
-        };
-        panel.draw(canvas, area)?;
-    }
-    let bottom = f64::from(size.1);
-    let legend = "Lower left is better. Ring: raypack's default. Dashes: Pareto front. \
-                  Bars: quickest to slowest round.";
-    canvas.text(legend, (middle, bottom - 28.0), 12.0, Ink::Faint, Anchor::Middle)?;
-    let legend = "Errors: missed and false hits and wrong primitives, against exact arithmetic.";
-    canvas.text(legend, (middle, bottom - 12.0), 12.0, Ink::Faint, Anchor::Middle)
 }
 
 fn panels(report: &Report) -> Vec<Panel> {

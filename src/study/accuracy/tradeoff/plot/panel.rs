@@ -1,8 +1,9 @@
 //! One panel: axes, points, the Pareto front and labels.
 
 use super::axis::{Axis, ErrorAxis, tick};
-use super::canvas::{Anchor, Area, Canvas, Failure, Ink};
+use super::canvas::{Anchor, Area, Canvas, Ink};
 use super::labels::Labels;
+use crate::study::plot::Drawn;
 use plotters::backend::DrawingBackend;
 
 const TICK_SIZE: f64 = 11.0;
@@ -47,8 +48,6 @@ pub struct Panel {
     /// Points that belong together, by their numbers; with such lines the front is not drawn.
     pub lines: Vec<Vec<usize>>,
 }
-
-type Drawn = Result<(), Failure>;
 
 impl Panel {
     /// Draws it, with its margins, into an area.

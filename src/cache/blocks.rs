@@ -1,0 +1,413 @@
+//! Blocks that come and go.
+//!
+//! This is where the parts meet: a thread that misses pins what it needs and asks the directory; what is
+//! absent is read by itself or by a loader; what had to go is retired, and freed when nobody can be reading
+//! it any more.
+
+use super::arena::Arena;
+use super::directory::{Asked, Directory, Pins};
+use super::epoch::Epochs;
+use super::gate::Gate;
+use super::layout::{Array, Layout};
+use super::plan::{CacheOptions, Loading, Plan};
+use super::quota::Quota;
+use super::source::Source;
+use super::stats::{CacheStats, Counters, add, nanos};
+use super::words::Words;
+use crate::error::Error;
+use crossbeam::channel::{Receiver, Sender, bounded};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// The most threads that may read at a time.
+const READERS: usize = 4096;
+
+/// What lengths of reads are multiples of: what checksums are for.
+const READ: usize = 4096;
+
+/// Requests that wait for a loader.
+const QUEUE: usize = 256;
+
+/// All blocks of a scene, and those of them that are here.
+#[derive(Debug)]
+pub struct Blocks {
+    pub layout: Layout,
+    pub arena: Arena,
+    pub words: Words,
+    pub epochs: Arc<Epochs>,
+    /// For threads that are at work: none, if each waits at its own place.
+    pub gate: Option<Gate>,
+    /// Counts tiles, to tell uses apart.
+    pub tick: AtomicU32,
+    pub counters: Counters,
+    pins: Pins,
+    quota: Quota,
+    directories: [Option<Directory>; 2],
+    source: Box<dyn Source>,
+    /// Blocks given up, with the epoch that they are retired at, oldest first.
+    retired: Mutex<VecDeque<(u64, u32)>>,
+    /// Blocks that have memory, or are about to: at most `limit`.
+    committed: AtomicUsize,
+    limit: usize,
+    most_committed: AtomicUsize,
+    failure: Mutex<Option<Error>>,
+    failed: AtomicBool,
+}
+
+/// The loaders, which end when this is dropped.
+#[derive(Debug, Default)]
+pub struct Loaders {
+    requests: Option<Sender<u32>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Blocks {
+    /// No block is here.
+    ///
+    /// # Errors
+    /// The system has no address space or starts no threads.
+    pub fn new(
+        layout: Layout,
+        source: Box<dyn Source>,
+        options: &CacheOptions,
+        plan: &Plan,
+        threads: usize,
+    ) -> std::io::Result<(Arc<Self>, Loaders)> {
+        let count = layout.blocks();
+        let gate = matches!(options.loading, Loading::Asynchronous { .. }).then(|| Gate::new(threads));
+        let blocks = Arc::new(Self {
+            arena: Arena::new(count << layout.shift())?,
+            words: Words::new(count),
+            epochs: Epochs::new(READERS),
+            gate,
+            tick: AtomicU32::new(0),
+            counters: Counters::default(),
+            pins: Pins::new(count),
+            quota: Quota::new(plan.pinned),
+            directories: plan.shapes.map(|shape| shape.map(Directory::new)),
+            source,
+            retired: Mutex::default(),
+            committed: AtomicUsize::new(0),
+            limit: plan.all,
+            most_committed: AtomicUsize::new(0),
+            failure: Mutex::default(),
+            failed: AtomicBool::new(false),
+            layout,
+        });
+        let mut loaders = Loaders::default();
+        if let Loading::Asynchronous { loaders: count } = options.loading {
+            let (sender, requests) = bounded(QUEUE);
+            loaders.requests = Some(sender);
+            for number in 0..count {
+                let (blocks, requests): (_, Receiver<u32>) = (Arc::clone(&blocks), requests.clone());
+                let loader = thread::Builder::new().name(format!("loader-{number}"));
+                loaders.threads.push(loader.spawn(move || {
+                    requests.iter().for_each(|block| blocks.load(block));
+                })?);
+            }
+        }
+        Ok((blocks, loaders))
+    }
+
+    /// Memory that is taken for `count` blocks beside their own.
+    pub fn overhead(count: usize) -> usize {
+        // Sets, their policies and hash tables come to some 64 bytes for a block that is here; few are.
+        Words::bytes(count) + Pins::bytes(count) + READERS * 128
+    }
+
+    fn directory(&self, block: u32) -> &Directory {
+        let second = block as usize >= self.layout.first_of_leaves();
+        let [first, other] = &self.directories;
+        other.as_ref().filter(|_| second).or(first.as_ref()).expect("there is a first directory")
+    }
+
+    /// Pins blocks and has all of them come. The caller must be in no epoch and have no place at the gate,
+    /// for who has one must not wait for those who are to give up pins when they have one again.
+    pub fn gather(&self, loaders: &Loaders, wanted: &[u32]) -> Gathered<'_> {
+        let taken = self.quota.take(wanted.len());
+        let (mut absent, mut missed) = (Vec::new(), 0);
+        for &block in wanted {
+            let gone = &mut |gone| self.retire(gone);
+            let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
+            missed += u64::from(asked != Asked::Here);
+            if asked == Asked::Absent {
+                absent.push(block);
+            }
+        }
+        match &loaders.requests {
+            Some(requests) => {
+                absent.iter().for_each(|&block| requests.send(block).expect("loaders outlive who waits"));
+            }
+            None => absent.iter().for_each(|&block| self.load(block)),
+        }
+        for &block in wanted {
+            self.directory(block).wait(block);
+        }
+        add(&self.counters.misses, missed);
+        Gathered { blocks: self, pinned: wanted.to_vec(), taken }
+    }
+
+    /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
+    /// again, who would not find it here.
+    fn retire(&self, gone: u32) {
+        add(&self.counters.evictions, 1);
+        let mut retired = self.retired();
+        retired.push_back((self.epochs.retire(), gone));
+    }
+
+    fn retired(&self) -> MutexGuard<'_, VecDeque<(u64, u32)>> {
+        self.retired.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Frees what nobody reads any more; whether that was anything.
+    fn reclaim(&self) -> bool {
+        let mut retired = self.retired();
+        let earliest = self.epochs.earliest();
+        let mut freed = 0;
+        while retired.front().is_some_and(|&(epoch, _)| epoch < earliest) {
+            let Some((_, block)) = retired.pop_front() else { break };
+            // SAFETY: it was declared gone before all epochs that a reader may be in, and it can only come
+            // back by being taken out of the list, whose lock is held.
+            unsafe { self.release(block) };
+            freed += 1;
+        }
+        self.committed.fetch_sub(freed, Ordering::AcqRel);
+        freed > 0
+    }
+
+    /// # Safety
+    /// Nobody may have a reference into the block.
+    unsafe fn release(&self, block: u32) {
+        let bytes = self.layout.block_bytes();
+        // SAFETY: as promised.
+        unsafe { self.arena.release(block as usize * bytes, bytes) };
+    }
+
+    /// Waits until there is memory for one more block, and takes it.
+    fn make_room(&self) {
+        let mut tries = 0;
+        loop {
+            let take = |committed| (committed < self.limit).then_some(committed + 1);
+            if let Ok(before) = self.committed.fetch_update(Ordering::AcqRel, Ordering::Acquire, take) {
+                self.most_committed.fetch_max(before + 1, Ordering::Relaxed);
+                return;
+            }
+            // Readers leave their epochs within a tile.
+            if !self.reclaim() {
+                tries += 1;
+                if tries < 16 {
+                    thread::yield_now()
+                } else {
+                    thread::sleep(Duration::from_micros(50))
+                }
+                if tries % 16 == 0 {
+                    self.shrink();
+                }
+            }
+        }
+    }
+
+    /// Gives up what sets hold beyond their ways, because it was pinned when it came.
+    fn shrink(&self) {
+        for directory in self.directories.iter().flatten() {
+            directory.shrink(&self.words, &self.pins, &mut |gone| self.retire(gone));
+        }
+    }
+
+    /// Brings a block that the directory has said is absent.
+    fn load(&self, block: u32) {
+        let tick = self.tick.load(Ordering::Relaxed);
+        // It may have been given up just now: then it is still where it was.
+        let kept = {
+            let mut retired = self.retired();
+            let at = retired.iter().position(|&(_, gone)| gone == block);
+            at.and_then(|at| retired.remove(at)).is_some()
+        };
+        if kept {
+            self.directory(block).arrived(block, &self.words, tick);
+            return;
+        }
+        self.make_room();
+        let start = Instant::now();
+        let (array, byte, bytes) = self.layout.locate(block);
+        // SAFETY: readers look only at what is here; the block is not, its last memory has been freed, and
+        // the directory tells one thread alone to load it.
+        let into =
+            unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ)) };
+        let read =
+            if self.has_failed() { Ok(false) } else { self.source.read(array, byte, into).map(|()| true) };
+        match read {
+            Ok(true) => {
+                add(&self.counters.loads, 1);
+                add(&self.counters.bytes_read, bytes as u64);
+                add(&self.counters.loading_ns, nanos(start.elapsed()));
+                self.directory(block).arrived(block, &self.words, tick);
+                return;
+            }
+            Ok(false) => {}
+            Err(error) => {
+                self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                self.failed.store(true, Ordering::Release);
+            }
+        }
+        // SAFETY: it never was here.
+        unsafe { self.release(block) };
+        self.committed.fetch_sub(1, Ordering::AcqRel);
+        self.directory(block).failed(block);
+    }
+
+    /// Whether a block could not be read: from then on none is.
+    pub fn has_failed(&self) -> bool {
+        self.failed.load(Ordering::Acquire)
+    }
+
+    /// Why, for the first who asks; blocks are read again afterwards.
+    pub fn take_failure(&self) -> Option<Error> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take();
+        self.failed.store(false, Ordering::Release);
+        failure
+    }
+
+    /// What was done since the last call.
+    pub fn take_stats(&self) -> CacheStats {
+        self.counters.take()
+    }
+
+    /// Bytes of blocks that have memory, and the most that ever had.
+    pub fn committed_bytes(&self) -> [usize; 2] {
+        [&self.committed, &self.most_committed].map(|n| n.load(Ordering::Relaxed) << self.layout.shift())
+    }
+
+    /// Gives up everything that is not in use, as if nothing had been read yet.
+    pub fn clear(&self) {
+        for directory in self.directories.iter().flatten() {
+            directory.clear(&self.words, &self.pins, &mut |gone| self.retire(gone));
+        }
+        self.reclaim();
+    }
+}
+
+/// Blocks that are here and will be as long as this is.
+#[must_use]
+pub struct Gathered<'a> {
+    blocks: &'a Blocks,
+    pinned: Vec<u32>,
+    taken: usize,
+}
+
+impl Drop for Gathered<'_> {
+    fn drop(&mut self) {
+        self.pinned.iter().for_each(|&block| self.blocks.pins.unpin(block));
+        self.blocks.quota.give(self.taken);
+    }
+}
+
+impl Drop for Loaders {
+    fn drop(&mut self) {
+        drop(self.requests.take());
+        for loader in self.threads.drain(..) {
+            // It ends with its last request; had it panicked, who waits for its block would wait forever.
+            loader.join().expect("loaders do not panic");
+        }
+    }
+}
+
+impl Array {
+    /// What messages call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nodes => "nodes",
+            Self::References => "references",
+            Self::Pages => "pages",
+            Self::Triangles => "triangles",
+            Self::Colors => "colours",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::local::Local;
+    use super::super::policy::Replacement;
+    use super::*;
+
+    const BLOCK: usize = 4096;
+
+    /// Blocks full of their own number.
+    #[derive(Debug)]
+    struct Numbered;
+
+    impl Source for Numbered {
+        fn read(&self, _: Array, byte: usize, into: &mut [u8]) -> crate::error::Result<()> {
+            into.as_chunks_mut::<4>().0.fill(((byte / BLOCK) as u32 + 1).to_le_bytes());
+            Ok(())
+        }
+    }
+
+    /// Threads that ask for blocks at random, hold some for a while, and look whether they are what they
+    /// should be, in a cache that is much too small for all.
+    fn stress(threads: usize, options: &CacheOptions, rounds: u32) {
+        const BLOCKS: usize = 60;
+        let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0], BLOCK);
+        let most = 3;
+        let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
+        let (blocks, loaders) =
+            Blocks::new(layout, Box::new(Numbered), options, &plan, threads).expect("starts");
+        thread::scope(|scope| {
+            for number in 0..threads as u32 {
+                let (blocks, loaders) = (&blocks, &loaders);
+                scope.spawn(move || {
+                    let mut state = number.wrapping_mul(0x9e37_79b9) | 1;
+                    let mut random = |below: usize| {
+                        state ^= state << 13;
+                        state ^= state >> 17;
+                        state ^= state << 5;
+                        state as usize % below
+                    };
+                    let local = Local::take(blocks);
+                    for _ in 0..rounds {
+                        let wanted: Vec<u32> = (0..=random(most)).map(|_| random(BLOCKS) as u32).collect();
+                        let gathered = blocks.gather(loaders, &wanted);
+                        local.reader.enter();
+                        drop(gathered);
+                        let found = || {
+                            wanted.iter().all(|&block| {
+                                // SAFETY: it was here when the epoch was entered, which goes on.
+                                let words = unsafe { blocks.arena.fill(block as usize * BLOCK, BLOCK) };
+                                words.as_chunks::<4>().0.iter().all(|word| *word == (block + 1).to_le_bytes())
+                            })
+                        };
+                        assert!(found(), "{wanted:?} at once");
+                        (0..random(4)).for_each(|_| thread::yield_now());
+                        assert!(found(), "{wanted:?} later in the epoch");
+                        local.reader.leave();
+                    }
+                    local.put();
+                });
+            }
+        });
+        assert!(blocks.committed_bytes()[1] <= plan.all * BLOCK);
+        assert!(blocks.take_stats().evictions > u64::from(rounds));
+    }
+
+    #[test]
+    fn blocks_are_what_they_should_be_for_as_long_as_they_are_read() {
+        for (i, policy) in Replacement::ALL.into_iter().enumerate() {
+            for loading in [Loading::Synchronous, Loading::Asynchronous { loaders: 3 }] {
+                let options = CacheOptions {
+                    block: BLOCK,
+                    ways: [1, 2, 5][i % 3],
+                    stripes: [1, 3][i % 2],
+                    policy,
+                    nodes: None,
+                    loading,
+                    direct: false,
+                };
+                stress(6, &options, 3000);
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Which byte of which array is in which block.
+
+use std::ops::Range;
+
+/// The arrays of a scene that come in blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Array {
+    /// The full tree's nodes.
+    Nodes,
+    /// The leaves' references.
+    References,
+    /// The pages' primitives.
+    Pages,
+    /// Triangle records.
+    Triangles,
+    /// What colour each triangle has.
+    Colors,
+}
+
+impl Array {
+    /// All of them, in the order of their blocks: nodes before what leaves need.
+    pub const ALL: [Self; 5] = [Self::Nodes, Self::References, Self::Pages, Self::Triangles, Self::Colors];
+}
+
+/// The least and the greatest size of a block.
+pub const BLOCK_BYTES: Range<usize> = 4096..(1 << 16) + 1;
+
+/// An array's place in the arena.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// Its first byte, at the start of a block.
+    pub base: usize,
+    /// How many it has.
+    pub bytes: usize,
+}
+
+/// All arrays, one behind the other, each from the start of a block on.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    columns: [Column; Array::ALL.len()],
+    shift: u32,
+    blocks: usize,
+}
+
+impl Layout {
+    /// Lays out arrays of so many bytes in blocks of `block` bytes. Panics if that is no power of two
+    /// between 4 and 64 KiB.
+    pub fn new(bytes: [usize; Array::ALL.len()], block: usize) -> Self {
+        assert!(block.is_power_of_two() && BLOCK_BYTES.contains(&block));
+        let mut end = 0;
+        let columns = bytes.map(|bytes| {
+            let base = end;
+            end += bytes.next_multiple_of(block);
+            Column { base, bytes }
+        });
+        let shift = block.trailing_zeros();
+        Self { columns, shift, blocks: end >> shift }
+    }
+
+    /// Bytes of a block.
+    pub const fn block_bytes(&self) -> usize {
+        1 << self.shift
+    }
+
+    /// The power of two that a block is.
+    #[inline(always)]
+    pub const fn shift(&self) -> u32 {
+        self.shift
+    }
+
+    /// How many blocks there are.
+    pub const fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// An array's place.
+    pub const fn column(&self, array: Array) -> Column {
+        self.columns[array as usize]
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        self.columns.iter().map(|column| column.bytes).sum()
+    }
+
+    /// The array that a block is of, the byte of it that the block begins with, and how many it holds.
+    pub fn locate(&self, block: u32) -> (Array, usize, usize) {
+        let at = (block as usize) << self.shift;
+        let holds = |array: &Array| {
+            let Column { base, bytes } = self.column(*array);
+            (base..base + bytes).contains(&at)
+        };
+        let array = Array::ALL.into_iter().find(holds).expect("a block of the layout");
+        let Column { base, bytes } = self.column(array);
+        (array, at - base, self.block_bytes().min(bytes - (at - base)))
+    }
+
+    /// The first block of what leaves need.
+    pub const fn first_of_leaves(&self) -> usize {
+        self.columns[Array::References as usize].base >> self.shift
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_is_in_one_block() {
+        let layout = Layout::new([5000, 0, 4096, 1, 12_288], 4096);
+        let found: Vec<_> = (0..layout.blocks() as u32).map(|block| layout.locate(block)).collect();
+        use Array::{Colors, Nodes, Pages, Triangles};
+        let expected = [
+            (Nodes, 0, 4096),
+            (Nodes, 4096, 904),
+            (Pages, 0, 4096),
+            (Triangles, 0, 1),
+            (Colors, 0, 4096),
+            (Colors, 4096, 4096),
+            (Colors, 8192, 4096),
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(layout.bytes(), 5000 + 4096 + 1 + 12_288);
+        assert_eq!(layout.first_of_leaves(), 2);
+    }
+}

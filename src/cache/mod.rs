@@ -1,0 +1,274 @@
+//! A scene of which only a part is in memory.
+//!
+//! The upper tree is resident (a hundredth of the data). Nodes, lists of primitives, triangles and colours lie
+//! in a file and come in *blocks* when a walk is about to look at them: the kernels say so beforehand
+//! ([`Tree::enter`](crate::kdtree::Tree::enter)), and a [`View`] of the tree sees to it that the blocks are here.
+//! For a resident tree that call is empty: the kernels are compiled for each.
+//!
+//! ```text
+//! kernel -- enter --> words: here? ---- yes --> go on (one load for each block)
+//!                       | no
+//!                       v
+//!                  leave the epoch, step aside -----------> another thread traces meanwhile
+//!                  quota: may I pin so many?
+//!                  directory (a stripe's lock): pin, ask;  what must go is declared gone, and retired
+//!                  loaders: room? read, check, arrive      (or the thread itself: synchronous loading)
+//!                  wait; step back, enter an epoch, unpin
+//! ```
+//!
+//! | file | what |
+//! |---|---|
+//! | `layout` | which byte of which array is in which block |
+//! | `arena` | addresses for all blocks, memory for those that are here |
+//! | `words` | a word for each block: here? used when, how often? |
+//! | `epoch` | who still reads, so that memory is not freed under him |
+//! | `directory`, `policy/` | sets of blocks behind striped locks, and which block makes room |
+//! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
+//! | `blocks` | all of these at work: asking, loading, giving up |
+//! | `local`, `view` | a thread's state, and the tree as it sees it |
+//! | `plan` | how the memory is divided |
+//! | `source`, `file` | where blocks come from |
+//!
+//! **Waiting is a thread's.** More threads than processors take part; one that waits for a block keeps its
+//! tile on its stack and lets another have its place. So the kernels need not be cut into pieces that can be
+//! suspended, and no state of a ray is ever put away or begun anew.
+//!
+//! **Errors.** A block that cannot be read, or is not what was written, unwinds through the kernels of all
+//! threads that need it and becomes an error of the frame: [`Cached::or_error`].
+
+mod arena;
+mod blocks;
+mod directory;
+mod epoch;
+mod file;
+mod gate;
+mod layout;
+mod local;
+mod plan;
+pub mod policy;
+mod quota;
+mod source;
+mod stats;
+mod view;
+mod words;
+
+pub use layout::Array;
+pub use plan::{CacheOptions, Loading, Plan};
+pub use source::Source;
+pub use stats::CacheStats;
+pub use view::View;
+
+use crate::error::{Error, Result};
+use crate::geometry::Aabb;
+use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
+use blocks::{Blocks, Loaders};
+use layout::Layout;
+use local::Local;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+use view::Unreadable;
+
+/// What is always in memory of a scene.
+#[derive(Debug)]
+pub struct Resident {
+    /// What the tree's coordinates are multiplied by.
+    pub scale: Scale,
+    /// The box around all triangles.
+    pub bounds: Aabb,
+    /// The full tree's root.
+    pub root: Node,
+    /// The upper tree.
+    pub upper: Vec<Node>,
+    /// The full tree's nodes at the same places.
+    pub beneath: Vec<u32>,
+    /// Bytes of the [arrays](Array) that come in blocks.
+    pub bytes: [usize; Array::ALL.len()],
+    /// The most blocks that a page or a leaf takes, by their size: see [`KdTree::spread`](
+    /// crate::kdtree::KdTree::spread).
+    pub spread: [usize; SPREAD_BLOCKS.len()],
+}
+
+/// A scene whose blocks come when they are needed.
+#[derive(Debug)]
+pub struct Cached {
+    scale: Scale,
+    bounds: Aabb,
+    root: Node,
+    upper: Vec<Node>,
+    beneath: Vec<u32>,
+    options: CacheOptions,
+    plan: Plan,
+    blocks: Arc<Blocks>,
+    loaders: Loaders,
+}
+
+impl Cached {
+    /// A scene of which up to `memory` bytes of blocks are in memory at a time, for `threads` at work.
+    ///
+    /// # Errors
+    /// An option makes no sense, the memory is too little ([`Error::Option`] of `--memory` in terms of what
+    /// `resident` and the blocks take together, `beside` included), or the system gives no address space.
+    pub fn new(
+        resident: Resident,
+        source: Box<dyn Source>,
+        options: &CacheOptions,
+        memory: usize,
+        beside: usize,
+        threads: usize,
+    ) -> Result<Self> {
+        options.check()?;
+        let layout = Layout::new(resident.bytes, options.block);
+        let size = SPREAD_BLOCKS.iter().position(|&block| block == options.block);
+        let most = resident.spread[size.expect("it was checked")].clamp(2, layout.blocks().max(2));
+        let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
+        let blocks = memory.saturating_sub(overhead) / options.block;
+        let workers = options.loading.workers(threads);
+        // More than would ever be used is left to the system.
+        let blocks = blocks.min(2 * layout.blocks() + Plan::least(options, most));
+        let plan = Plan::new(options, blocks, most, workers);
+        let Some(plan) = plan else {
+            let least = overhead + Plan::least(options, most) * options.block;
+            let message = format!(
+                "{} is too little for this scene: it takes at least {} with blocks of {} KiB",
+                mebibytes(memory),
+                mebibytes(least),
+                options.block >> 10,
+            );
+            return Err(Error::option("--memory", message));
+        };
+        let system = |source| Error::Missing {
+            what: "address space, or threads for loaders".into(),
+            remedy: format!("the system said: {source}"),
+        };
+        let (blocks, loaders) = Blocks::new(layout, source, options, &plan, threads).map_err(system)?;
+        let Resident { scale, bounds, root, upper, beneath, .. } = resident;
+        Ok(Self { scale, bounds, root, upper, beneath, options: *options, plan, blocks, loaders })
+    }
+
+    /// What was chosen.
+    pub fn options(&self) -> &CacheOptions {
+        &self.options
+    }
+
+    /// How the memory is divided.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The box around all triangles, in the tree's coordinates.
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// The same box in the mesh's coordinates.
+    pub fn mesh_bounds(&self) -> Aabb {
+        self.scale.undo_bounds(&self.bounds)
+    }
+
+    /// What the tree's coordinates are multiplied by.
+    pub fn scale(&self) -> Scale {
+        self.scale
+    }
+
+    /// Bytes of all blocks.
+    pub fn data_bytes(&self) -> usize {
+        self.blocks.layout.bytes()
+    }
+
+    /// Bytes of the blocks that are in memory, and the most that were.
+    pub fn memory_bytes(&self) -> [usize; 2] {
+        self.blocks.committed_bytes()
+    }
+
+    /// Threads that should trace so that `threads` are at work when some wait.
+    pub fn workers(&self, threads: usize) -> usize {
+        self.options.loading.workers(threads)
+    }
+
+    /// The tree as this thread sees it, for one query.
+    #[inline]
+    pub fn view(&self) -> View<'_> {
+        View::new(self)
+    }
+
+    /// Begins a tile, when it is this thread's turn. Queries within it are cheaper.
+    pub fn session(&self) -> Session<'_> {
+        let mut local = Local::take(&self.blocks);
+        local.begin_at_gate();
+        local.put();
+        self.blocks.tick.fetch_add(1, Ordering::Relaxed);
+        Session { cached: self }
+    }
+
+    /// All that this thread has waited for blocks so far.
+    pub fn stalled(&self) -> Duration {
+        self.view().stalled()
+    }
+
+    /// Runs something that reads the scene, on any number of threads.
+    ///
+    /// # Errors
+    /// A block could not be read meanwhile.
+    pub fn or_error<R>(&self, run: impl FnOnce() -> R) -> Result<R> {
+        // Nothing that a kernel leaves behind is used again.
+        match panic::catch_unwind(AssertUnwindSafe(run)) {
+            Ok(done) => Ok(done),
+            Err(payload) if payload.is::<Unreadable>() => {
+                Err(self.blocks.take_failure().expect("who unwinds says why"))
+            }
+            Err(payload) => panic::resume_unwind(payload),
+        }
+    }
+
+    /// What the cache did since the last call.
+    pub fn take_stats(&self) -> CacheStats {
+        self.blocks.take_stats()
+    }
+
+    /// From now on, takes note of uses, or no longer does.
+    pub fn trace_uses(&self, on: bool) {
+        self.blocks.words.trace(on);
+    }
+
+    /// The blocks that were used since the last call, each once a tile, in about the order of use.
+    pub fn take_uses(&self) -> Vec<u32> {
+        self.blocks.words.take_trace()
+    }
+
+    /// Forgets all that is not in use at the moment.
+    pub fn clear(&self) {
+        self.blocks.clear();
+    }
+}
+
+impl Drop for Cached {
+    fn drop(&mut self) {
+        // What this thread keeps for its next use would keep the memory.
+        drop(Local::take(&self.blocks));
+    }
+}
+
+/// A tile's time.
+#[must_use]
+#[derive(Debug)]
+pub struct Session<'a> {
+    cached: &'a Cached,
+}
+
+impl Drop for Session<'_> {
+    fn drop(&mut self) {
+        let mut local = Local::take(&self.cached.blocks);
+        local.end();
+        local.put();
+    }
+}
+
+/// Bytes as messages tell them, rounded up.
+fn mebibytes(bytes: usize) -> String {
+    format!("{} MiB", bytes.div_ceil(1 << 20))
+}
+
+#[cfg(test)]
+mod tests;

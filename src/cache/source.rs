@@ -1,0 +1,15 @@
+//! Where blocks come from.
+
+use super::layout::Array;
+use crate::error::Result;
+use std::fmt;
+
+/// Something that blocks can be read from.
+pub trait Source: Send + Sync + fmt::Debug {
+    /// Reads bytes of an array, from `byte` on, to fill `into`, which may reach beyond the array's end to the
+    /// next multiple of 4 KiB: whatever is there. Called by many threads at once.
+    ///
+    /// # Errors
+    /// They cannot be read, or are not what was written.
+    fn read(&self, array: Array, byte: usize, into: &mut [u8]) -> Result<()>;
+}

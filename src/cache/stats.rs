@@ -1,0 +1,69 @@
+//! What a cache did.
+
+use serde::Serialize;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Counts of a cache's work, since it was opened or [reset](Counters::take).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct CacheStats {
+    /// Times that a walk asked whether a block is here.
+    pub lookups: u64,
+    /// Blocks that were waited for.
+    pub misses: u64,
+    /// Blocks that were read.
+    pub loads: u64,
+    /// Bytes that were read.
+    pub bytes_read: u64,
+    /// Blocks that made room.
+    pub evictions: u64,
+    /// Seconds that threads waited for blocks, added up.
+    pub stalled: f64,
+    /// Seconds that loaders read, added up.
+    pub loading: f64,
+}
+
+impl CacheStats {
+    /// The share of look-ups that found their block.
+    pub fn hit_ratio(&self) -> f64 {
+        if self.lookups == 0 { 1.0 } else { 1.0 - self.misses as f64 / self.lookups as f64 }
+    }
+}
+
+/// The same, while it is counted.
+#[derive(Debug, Default)]
+pub struct Counters {
+    pub lookups: AtomicU64,
+    pub misses: AtomicU64,
+    pub loads: AtomicU64,
+    pub bytes_read: AtomicU64,
+    pub evictions: AtomicU64,
+    pub stalled_ns: AtomicU64,
+    pub loading_ns: AtomicU64,
+}
+
+/// Adds to a counter.
+pub fn add(counter: &AtomicU64, n: u64) {
+    counter.fetch_add(n, Ordering::Relaxed);
+}
+
+/// Nanoseconds.
+pub fn nanos(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+impl Counters {
+    /// The counts so far; begins again from 0.
+    pub fn take(&self) -> CacheStats {
+        let take = |counter: &AtomicU64| counter.swap(0, Ordering::Relaxed);
+        CacheStats {
+            lookups: take(&self.lookups),
+            misses: take(&self.misses),
+            loads: take(&self.loads),
+            bytes_read: take(&self.bytes_read),
+            evictions: take(&self.evictions),
+            stalled: take(&self.stalled_ns) as f64 * 1e-9,
+            loading: take(&self.loading_ns) as f64 * 1e-9,
+        }
+    }
+}

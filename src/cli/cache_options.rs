@@ -1,0 +1,139 @@
+//! How a scene is held that is not all in memory.
+
+use super::report::{Lines, bytes, counted, grouped};
+use crate::cache::policy::Replacement;
+use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
+use crate::error::{Error, Result};
+use crate::study::resident;
+use serde::Serialize;
+
+/// `--policy`, `--block` and so on: what becomes of `--memory` with a scene file.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Scene files within --memory")]
+pub struct CacheArgs {
+    /// Which block makes room for another: fifo, lru, frequency, decaying, clock, sieve or s3-fifo
+    #[arg(long, value_name = "NAME", default_value = Replacement::default().name())]
+    policy: String,
+    /// Bytes of a block: 4096, 8192, 16384, 32768 or 65536
+    #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]
+    block: usize,
+    /// Blocks that a set holds: more of them keep what is used better and take longer to choose from
+    #[arg(long, value_name = "N", default_value_t = CacheOptions::default().ways)]
+    ways: usize,
+    /// Locks that sets share
+    #[arg(long, value_name = "N", default_value_t = CacheOptions::default().stripes)]
+    stripes: usize,
+    /// Who reads: async (threads of their own, while other tiles go on) or sync (who needs a block waits for it)
+    #[arg(long, value_name = "async|sync", default_value = "async")]
+    loading: String,
+    /// Threads that read, if they are threads of their own
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    loaders: usize,
+    /// A cache of its own for nodes, as PART:POLICY: the part (0.01 to 0.99) of the memory that it has
+    #[arg(long, value_name = "PART:POLICY")]
+    nodes: Option<String>,
+    /// Read past the system's own memory of the file (Linux)
+    #[arg(long)]
+    direct: bool,
+}
+
+impl CacheArgs {
+    /// The options, checked.
+    ///
+    /// # Errors
+    /// One makes no sense.
+    pub fn options(&self) -> Result<CacheOptions> {
+        let options = CacheOptions {
+            block: self.block,
+            ways: self.ways,
+            stripes: self.stripes,
+            policy: self.policy.parse()?,
+            nodes: self.nodes.as_deref().map(nodes).transpose()?,
+            loading: loading(&self.loading, self.loaders)?,
+            direct: self.direct,
+        };
+        options.check()?;
+        Ok(options)
+    }
+}
+
+/// `sync` or `async`.
+pub fn loading(name: &str, loaders: usize) -> Result<Loading> {
+    match name {
+        "async" => Ok(Loading::Asynchronous { loaders }),
+        "sync" => Ok(Loading::Synchronous),
+        _ => Err(Error::option("--loading", format!("\"{name}\" is neither async nor sync"))),
+    }
+}
+
+/// `0.25:lru`.
+fn nodes(text: &str) -> Result<(f32, Replacement)> {
+    let wrong = || Error::option("--nodes", format!("\"{text}\" is not PART:POLICY, such as 0.25:lru"));
+    let (part, policy) = text.split_once(':').ok_or_else(wrong)?;
+    Ok((part.trim().parse().map_err(|_| wrong())?, policy.trim().parse()?))
+}
+
+/// What a report says about a scene that is not all in memory.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CacheReport {
+    /// The memory that the process might take.
+    pub budget: usize,
+    /// The most that it took, where the system says.
+    pub peak_resident: Option<u64>,
+    /// The most that blocks took of that.
+    pub peak_blocks: usize,
+    /// Bytes of all blocks of the scene.
+    pub data: usize,
+    /// How blocks were held.
+    pub options: CacheOptions,
+    /// The share of look-ups that found their block.
+    pub hit_ratio: f64,
+    /// What the cache did.
+    #[serde(flatten)]
+    pub stats: CacheStats,
+}
+
+impl CacheReport {
+    /// What there is to say at the end.
+    pub fn new(budget: usize, cached: &Cached) -> Self {
+        let stats = cached.take_stats();
+        Self {
+            budget,
+            peak_resident: resident::peak(),
+            peak_blocks: cached.memory_bytes()[1],
+            data: cached.data_bytes(),
+            options: *cached.options(),
+            hit_ratio: stats.hit_ratio(),
+            stats,
+        }
+    }
+
+    /// The same in words.
+    pub fn describe(&self, lines: &mut Lines) {
+        let [budget, blocks, data] = [self.budget, self.peak_blocks, self.data].map(|n| bytes(n as u64));
+        let peak = self.peak_resident.map_or("an unknown part".into(), bytes);
+        lines.add("memory", format!("{peak} of {budget} at most; blocks {blocks} of {data}"));
+        let CacheOptions { policy, block, loading, .. } = self.options;
+        let who = match loading {
+            Loading::Synchronous => "read by who needs them".into(),
+            Loading::Asynchronous { loaders } => format!("read by {}", counted(loaders as u64, "loader")),
+        };
+        lines.add("cache", format!("{policy}, blocks of {} KiB, {who}", block >> 10));
+        let CacheStats { loads, bytes_read, stalled, .. } = self.stats;
+        lines.add(
+            "",
+            format!(
+                "{:.3} % of look-ups hit, {} blocks ({}) read, threads waited {stalled:.2} s",
+                self.hit_ratio * 100.0,
+                grouped(loads),
+                bytes(bytes_read),
+            ),
+        );
+    }
+}
+
+/// Bytes that a process has taken before it opens a scene, where the system says.
+pub fn taken_so_far() -> usize {
+    // What a small program takes, if the system does not say.
+    resident::now().map_or(24 << 20, |bytes| bytes as usize)
+}

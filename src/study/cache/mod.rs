@@ -1,0 +1,188 @@
+//! What a cache is worth: a camera path under budgets, policies and ways of loading.
+//!
+//! The seed paper (Portelli, "Out-of-core rendering of massive data sets") flew 15 frames of 2 degrees round a
+//! model of which 16 % or 39 % was in memory. [`run`] does that for each [`Trial`], from an empty cache
+//! (*cold*) and once more with what the first time has left (*warm*), beside the resident scene; and it tells
+//! how many misses the best of all policies would have had on the same uses (`minimum`).
+//!
+//! The system keeps files in its own memory, where a read costs some microseconds instead of what the disk
+//! takes. [`CacheOptions::direct`] goes past that; reports say which it was.
+
+pub mod minimum;
+#[cfg(feature = "accuracy")]
+pub mod plot;
+mod report;
+
+pub use report::{FrameRow, Report, Row};
+
+use crate::cache::policy::Replacement;
+use crate::cache::{CacheOptions, Cached, Loading};
+use crate::error::Result;
+use crate::geometry::Accuracy;
+use crate::render::{RenderSettings, Renderer, Size};
+use crate::scene::{CachedSurface, Camera, Lighting, Orbit, Surface};
+use crate::simd::Isa;
+use crate::store;
+use crate::study::bench::machine;
+use crate::traverse::Accel;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What is flown, and through which caches.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The first camera; without it, the whole scene is framed.
+    pub camera: Option<Camera>,
+    /// The path.
+    pub orbit: Orbit,
+    /// The size of frames.
+    pub size: Size,
+    /// Whether the key light casts shadows: then half of the rays do not start at the eye.
+    pub shadows: bool,
+    /// Shares of the scene's data that are in memory, 0 to 1.
+    pub budgets: Vec<f64>,
+    /// Which block makes room.
+    pub policies: Vec<Replacement>,
+    /// Who reads.
+    pub loadings: Vec<Loading>,
+    /// All else about the caches.
+    pub cache: CacheOptions,
+    /// The part of the memory that nodes have to themselves, in a cache of the same policy; `None` for one
+    /// cache of all.
+    pub nodes: Option<f32>,
+    /// Threads at work.
+    pub threads: usize,
+    /// How hits are decided.
+    pub accuracy: Accuracy,
+    /// The instruction set.
+    pub isa: Isa,
+}
+
+/// One cache.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// The share of the data that is in memory.
+    pub budget: f64,
+    /// All else.
+    pub options: CacheOptions,
+}
+
+impl Options {
+    /// Everything that is tried, in the order of the report.
+    pub fn trials(&self) -> Vec<Trial> {
+        let mut trials = Vec::new();
+        for &budget in &self.budgets {
+            for &policy in &self.policies {
+                for &loading in &self.loadings {
+                    let nodes = self.nodes.map(|part| (part, policy));
+                    let options = CacheOptions { policy, loading, nodes, ..self.cache };
+                    trials.push(Trial { budget, options });
+                }
+            }
+        }
+        trials
+    }
+}
+
+/// Flies the path through every cache. `progress` is told what part (0 to 1) is behind.
+///
+/// # Errors
+/// The file cannot be read, or is damaged; a budget is too small for the scene.
+pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Result<Report> {
+    // The resident scene, warm, is what all are compared with.
+    let resident = Accel::of_tree(file.tree()?).with_isa(options.isa).with_accuracy(options.accuracy);
+    let flight = Flight::new(file, &resident, options);
+    let trials = options.trials();
+    let steps = 2 * (trials.len() + 1);
+    let done = AtomicUsize::new(0);
+    let step = || progress(done.fetch_add(1, Ordering::Relaxed) as f64 / steps as f64);
+
+    let surface = file.stored()?;
+    let renderer = Renderer::new(&resident, &surface, flight.settings.clone())?;
+    flight.fly(&renderer, None)?;
+    step();
+    let frames = flight.fly(&renderer, None)?;
+    step();
+    let mut rows = vec![Row::resident(frames)];
+    drop(renderer);
+    drop((surface, resident));
+
+    for trial in trials {
+        let memory = (flight.data as f64 * trial.budget) as usize;
+        let cached = Cached::open(file, &trial.options, memory, 0, options.threads)?;
+        let cached = Arc::new(cached);
+        let accel =
+            Accel::of_cached(Arc::clone(&cached)).with_isa(options.isa).with_accuracy(options.accuracy);
+        let surface = CachedSurface::new(Arc::clone(&cached), file);
+        let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
+        cached.trace_uses(true);
+        for warm in [false, true] {
+            let frames = flight.fly(&renderer, Some(&cached))?;
+            let uses = cached.take_uses();
+            let minimum = minimum::misses(&uses, cached.plan().held(), warm);
+            rows.push(Row::cached(&trial, warm, memory, &cached, frames, [uses.len() as u64, minimum]));
+            step();
+        }
+    }
+    Ok(flight.report(file, options, rows))
+}
+
+/// The path, ready to be flown.
+struct Flight {
+    cameras: Vec<Camera>,
+    lighting: Lighting,
+    settings: RenderSettings,
+    /// Bytes of what comes in blocks.
+    data: usize,
+}
+
+impl Flight {
+    fn new(file: &store::File, accel: &Accel, options: &Options) -> Self {
+        let camera =
+            options.camera.unwrap_or_else(|| Camera::framing(&accel.bounds(), options.size.aspect()));
+        let lighting = Lighting::for_view(&camera, accel);
+        let mut settings = RenderSettings::new(options.size);
+        settings.shadows = options.shadows;
+        settings.tuning.threads = options.threads;
+        let cameras = options.orbit.cameras(camera).collect();
+        Self { cameras, lighting, settings, data: Cached::data_bytes_of(file) }
+    }
+
+    /// Renders all frames, and says what each took.
+    fn fly<S: Surface>(&self, renderer: &Renderer<'_, S>, cached: Option<&Cached>) -> Result<Vec<FrameRow>> {
+        let frame = |camera: &Camera| {
+            let (_, stats) = renderer.frame_with_progress(camera, &self.lighting, &AtomicUsize::new(0))?;
+            let cache = cached.map(Cached::take_stats).unwrap_or_default();
+            Ok(FrameRow {
+                seconds: stats.seconds,
+                rays: stats.total.rays,
+                tile_p50: stats.tile_p50,
+                tile_p99: stats.tile_p99,
+                cache,
+            })
+        };
+        self.cameras.iter().map(frame).collect()
+    }
+
+    fn report(&self, file: &store::File, options: &Options, rows: Vec<Row>) -> Report {
+        Report {
+            scene: file.path().display().to_string(),
+            triangles: file.meta().triangles,
+            data_bytes: self.data as u64,
+            file_bytes: file.bytes(),
+            size: options.size.to_string(),
+            frames: self.cameras.len(),
+            step_degrees: options.orbit.step,
+            shadows: options.shadows,
+            direct: options.cache.direct,
+            threads: options.threads,
+            isa: options.isa.name(),
+            accuracy: options.accuracy,
+            processor: machine::processor(),
+            raypack: env!("CARGO_PKG_VERSION"),
+            build: machine::build_profile(),
+            date: machine::date(),
+            rows,
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! What flights through caches took, as tables and as JSON.
+
+use super::Trial;
+use crate::cache::policy::Replacement;
+use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
+use crate::geometry::Accuracy;
+use crate::study::text::{figure, grid, grouped};
+use serde::Serialize;
+use std::fmt;
+
+/// A frame.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct FrameRow {
+    /// Wall-clock time.
+    pub seconds: f64,
+    /// All rays.
+    pub rays: u64,
+    /// The time that half of the tiles stayed below, in seconds, waiting included.
+    pub tile_p50: f64,
+    /// The time that 99 % of the tiles stayed below.
+    pub tile_p99: f64,
+    /// What the cache did.
+    pub cache: CacheStats,
+}
+
+/// A flight.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The share of the data that may be in memory; 1 for the resident scene.
+    pub budget: f64,
+    /// Bytes that the scene may take; 0 for the resident scene.
+    pub memory_bytes: usize,
+    /// Which block makes room; `None` for the resident scene.
+    pub policy: Option<Replacement>,
+    /// Who reads.
+    pub loading: Option<Loading>,
+    /// All else about the cache.
+    pub cache: Option<CacheOptions>,
+    /// Whether the cache held what the same flight had left.
+    pub warm: bool,
+    /// All rays of all frames in their time.
+    pub rays_per_s: f64,
+    /// The slowest and the fastest frame in seconds.
+    pub frame_seconds: [f64; 2],
+    /// The share of look-ups that found their block.
+    pub hit_ratio: f64,
+    /// Uses of blocks, counted once for each tile.
+    pub uses: u64,
+    /// Blocks that were read.
+    pub loads: u64,
+    /// Blocks that the best of all policies would have had to read, for these uses.
+    pub minimum: u64,
+    /// Blocks that the cache holds, those that are pinned or on their way out left aside.
+    pub held: usize,
+    /// Bytes that were read.
+    pub bytes_read: u64,
+    /// Seconds that threads waited, added up.
+    pub stalled: f64,
+    /// The share of the time in which a loader had nothing to do.
+    pub loader_idle: f64,
+    /// Tiles' times: of half of them, and of 99 %, the middle frame's.
+    pub tile_p50: f64,
+    /// The same.
+    pub tile_p99: f64,
+    /// The frames in order.
+    pub frames: Vec<FrameRow>,
+}
+
+impl Row {
+    /// A flight through a scene that is all in memory.
+    pub fn resident(frames: Vec<FrameRow>) -> Self {
+        let seconds: f64 = frames.iter().map(|frame| frame.seconds).sum();
+        let sum = |of: fn(&CacheStats) -> u64| frames.iter().map(|frame| of(&frame.cache)).sum::<u64>();
+        let (lookups, misses) = (sum(|c| c.lookups), sum(|c| c.misses));
+        let all = CacheStats { lookups, misses, ..CacheStats::default() };
+        let middle = |of: fn(&FrameRow) -> f64| {
+            let mut times: Vec<f64> = frames.iter().map(of).collect();
+            times.sort_by(f64::total_cmp);
+            times.get(times.len() / 2).copied().unwrap_or_default()
+        };
+        let rays: u64 = frames.iter().map(|frame| frame.rays).sum();
+        let extreme = |pick: fn(f64, f64) -> f64, start| frames.iter().map(|f| f.seconds).fold(start, pick);
+        Self {
+            budget: 1.0,
+            memory_bytes: 0,
+            policy: None,
+            loading: None,
+            cache: None,
+            warm: true,
+            rays_per_s: rays as f64 / seconds,
+            frame_seconds: [extreme(f64::max, 0.0), extreme(f64::min, f64::INFINITY)],
+            hit_ratio: all.hit_ratio(),
+            uses: 0,
+            loads: sum(|c| c.loads),
+            minimum: 0,
+            held: 0,
+            bytes_read: sum(|c| c.bytes_read),
+            stalled: frames.iter().map(|frame| frame.cache.stalled).sum(),
+            loader_idle: 0.0,
+            tile_p50: middle(|frame| frame.tile_p50),
+            tile_p99: middle(|frame| frame.tile_p99),
+            frames,
+        }
+    }
+
+    /// A flight through a cache.
+    pub fn cached(
+        trial: &Trial,
+        warm: bool,
+        memory_bytes: usize,
+        cached: &Cached,
+        frames: Vec<FrameRow>,
+        [uses, minimum]: [u64; 2],
+    ) -> Self {
+        let seconds: f64 = frames.iter().map(|frame| frame.seconds).sum();
+        let loading: f64 = frames.iter().map(|frame| frame.cache.loading).sum();
+        let loader_idle = match trial.options.loading {
+            Loading::Synchronous => 0.0,
+            Loading::Asynchronous { loaders } => 1.0 - loading / (seconds * loaders as f64),
+        };
+        Self {
+            budget: trial.budget,
+            memory_bytes,
+            policy: Some(trial.options.policy),
+            loading: Some(trial.options.loading),
+            cache: Some(trial.options),
+            warm,
+            uses,
+            minimum,
+            held: cached.plan().held(),
+            loader_idle,
+            ..Self::resident(frames)
+        }
+    }
+
+    /// In a few words.
+    pub fn name(&self) -> String {
+        let loading = match self.loading {
+            None => return "resident".into(),
+            Some(Loading::Synchronous) => "sync",
+            Some(Loading::Asynchronous { .. }) => "async",
+        };
+        let policy = self.policy.map_or("", Replacement::name);
+        let pass = if self.warm { "warm" } else { "cold" };
+        format!("{:.0} % {policy} {loading} {pass}", self.budget * 100.0)
+    }
+}
+
+/// All flights.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The scene file.
+    pub scene: String,
+    /// Its triangles.
+    pub triangles: u64,
+    /// Bytes of what comes in blocks: what budgets are shares of.
+    pub data_bytes: u64,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// The size of frames.
+    pub size: String,
+    /// Frames of the path.
+    pub frames: usize,
+    /// Degrees from one to the next.
+    pub step_degrees: f64,
+    /// Whether there are shadow rays.
+    pub shadows: bool,
+    /// Whether reads went past the system's own memory of the file.
+    pub direct: bool,
+    /// Threads at work.
+    pub threads: usize,
+    /// The instruction set.
+    pub isa: &'static str,
+    /// How hits were decided.
+    pub accuracy: Accuracy,
+    /// The machine's processor.
+    pub processor: String,
+    /// The engine's version.
+    pub raypack: &'static str,
+    /// The engine's build: `release` or `dev`.
+    pub build: &'static str,
+    /// When it was, in UTC.
+    pub date: String,
+    /// The resident scene's, and the caches'.
+    pub rows: Vec<Row>,
+}
+
+/// What the seed paper reports for its power plant of 12.7 M triangles, in rays a second: the least and the
+/// greatest of its caches.
+const PAPER: [f64; 2] = [3e3, 12e3];
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} triangles, {:.1} MB of data in blocks (file {:.1} MB)",
+            self.scene,
+            grouped(self.triangles),
+            self.data_bytes as f64 * 1e-6,
+            self.file_bytes as f64 * 1e-6
+        )?;
+        writeln!(
+            f,
+            "{} frames of {}, {} degrees apart, {}; {} threads, {}, {}, {}, raypack {} ({} build), {}",
+            self.frames,
+            self.size,
+            self.step_degrees,
+            if self.shadows { "camera and shadow rays" } else { "camera rays" },
+            self.threads,
+            self.isa,
+            self.accuracy,
+            self.processor,
+            self.raypack,
+            self.build,
+            self.date
+        )?;
+        let how = if self.direct {
+            "past the system's memory: what a read takes is what the disk takes"
+        } else {
+            "through the system's memory: the file may be there already, and a read then takes microseconds"
+        };
+        writeln!(f, "reads go {how}\n")?;
+        let resident = self.rows.first().map_or(1.0, |row| row.rays_per_s);
+        let head = [
+            "in memory",
+            "policy",
+            "loading",
+            "pass",
+            "Mrays/s",
+            "of resident",
+            "x paper",
+            "hits %",
+            "blocks read",
+            "least",
+            "MB read",
+            "stalled s",
+            "loaders idle %",
+            "tile ms p50",
+            "p99",
+            "frame ms",
+        ];
+        let mut lines = vec![head.map(String::from).to_vec()];
+        for row in &self.rows {
+            let of = |cached: String| if row.policy.is_some() { cached } else { "-".into() };
+            lines.push(vec![
+                format!("{:.0} %", row.budget * 100.0),
+                row.policy.map_or("resident", Replacement::name).into(),
+                match row.loading {
+                    None => "-".into(),
+                    Some(Loading::Synchronous) => "sync".into(),
+                    Some(Loading::Asynchronous { .. }) => "async".into(),
+                },
+                if row.warm { "warm" } else { "cold" }.into(),
+                figure(row.rays_per_s * 1e-6),
+                format!("{:.2}", row.rays_per_s / resident),
+                format!("{:.0}", row.rays_per_s / PAPER[1]),
+                of(format!("{:.2}", row.hit_ratio * 100.0)),
+                of(row.loads.to_string()),
+                of(row.minimum.to_string()),
+                of(format!("{:.1}", row.bytes_read as f64 * 1e-6)),
+                of(format!("{:.2}", row.stalled)),
+                of(format!("{:.0}", row.loader_idle * 100.0)),
+                format!("{:.2}", row.tile_p50 * 1e3),
+                format!("{:.2}", row.tile_p99 * 1e3),
+                format!("{:.1}-{:.1}", row.frame_seconds[1] * 1e3, row.frame_seconds[0] * 1e3),
+            ]);
+        }
+        f.write_str(&grid(&lines))?;
+        writeln!(
+            f,
+            "\nleast: what the policy that knows the future would have read (Belady's MIN, on the uses of that \
+             flight)\nx paper: of the 12 thousand rays/s that Portelli's power plant of 12.7 M triangles reached; \
+             its least was {} thousand",
+            PAPER[0] * 1e-3
+        )?;
+        self.by_frame(f)
+    }
+}
+
+impl Report {
+    /// Rays a second by frame, as the seed paper's tables have it: a row a frame, a column a cache.
+    fn by_frame(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut budgets: Vec<f64> = self.rows.iter().skip(1).map(|row| row.budget).collect();
+        budgets.dedup();
+        for budget in budgets {
+            for warm in [false, true] {
+                let rows: Vec<&Row> = self
+                    .rows
+                    .iter()
+                    .filter(|r| r.policy.is_some() && r.budget == budget && r.warm == warm)
+                    .collect();
+                let pass = if warm { "warm" } else { "cold" };
+                writeln!(f, "\nMrays/s by frame, {:.0} % in memory, {pass}", budget * 100.0)?;
+                let name = |row: &&Row| {
+                    let name = row.name();
+                    name.split(' ').skip(2).take(2).collect::<Vec<_>>().join(" ")
+                };
+                let mut lines = vec![
+                    std::iter::once("frame".to_string()).chain(rows.iter().map(name)).collect::<Vec<_>>(),
+                ];
+                for frame in 0..self.frames {
+                    let rate = |row: &&Row| {
+                        row.frames.get(frame).map_or("-".into(), |f| figure(f.rays as f64 / f.seconds * 1e-6))
+                    };
+                    lines.push(
+                        std::iter::once((frame + 1).to_string()).chain(rows.iter().map(rate)).collect(),
+                    );
+                }
+                f.write_str(&grid(&lines))?;
+            }
+        }
+        Ok(())
+    }
+}
