@@ -53,6 +53,8 @@ pub struct Blocks {
     committed: AtomicUsize,
     limit: usize,
     most_committed: AtomicUsize,
+    /// Whether a block had to go since this was last cleared.
+    pub short: AtomicBool,
     failure: Mutex<Option<Error>>,
     failed: AtomicBool,
 }
@@ -93,6 +95,7 @@ impl Blocks {
             committed: AtomicUsize::new(0),
             limit: plan.all,
             most_committed: AtomicUsize::new(0),
+            short: AtomicBool::new(false),
             failure: Mutex::default(),
             failed: AtomicBool::new(false),
             layout,
@@ -154,6 +157,7 @@ impl Blocks {
     /// again, who would not find it here.
     fn retire(&self, gone: u32) {
         add(&self.counters.evictions, 1);
+        self.short.store(true, Ordering::Relaxed);
         let mut retired = self.retired();
         retired.push_back((self.epochs.retire(), gone));
     }

@@ -66,7 +66,7 @@ use layout::Layout;
 use local::Local;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use view::Unreadable;
 
@@ -100,6 +100,8 @@ pub struct Cached {
     beneath: Vec<u32>,
     options: CacheOptions,
     plan: Plan,
+    /// Whether the last frame had to give blocks up.
+    was_short: AtomicBool,
     blocks: Arc<Blocks>,
     loaders: Loaders,
 }
@@ -144,7 +146,8 @@ impl Cached {
         };
         let (blocks, loaders) = Blocks::new(layout, source, options, &plan, threads).map_err(system)?;
         let Resident { scale, bounds, root, upper, beneath, .. } = resident;
-        Ok(Self { scale, bounds, root, upper, beneath, options: *options, plan, blocks, loaders })
+        let was_short = AtomicBool::new(false);
+        Ok(Self { scale, bounds, root, upper, beneath, options: *options, plan, was_short, blocks, loaders })
     }
 
     /// What was chosen.
@@ -185,6 +188,16 @@ impl Cached {
     /// Threads that should trace so that `threads` are at work when some wait.
     pub fn workers(&self, threads: usize) -> usize {
         self.options.loading.workers(threads)
+    }
+
+    /// Begins a frame.
+    pub fn begin_frame(&self) {
+        self.was_short.store(self.blocks.short.swap(false, Ordering::Relaxed), Ordering::Relaxed);
+    }
+
+    /// Whether blocks have had to go, in this frame or in the one before: then it pays to need few of them.
+    pub fn is_short(&self) -> bool {
+        self.was_short.load(Ordering::Relaxed) || self.blocks.short.load(Ordering::Relaxed)
     }
 
     /// The tree as this thread sees it, for one query.

@@ -29,12 +29,12 @@ pub struct CacheOptions {
 impl Default for CacheOptions {
     fn default() -> Self {
         Self {
-            block: 1 << 14,
+            block: 1 << 12,
             ways: 32,
             stripes: 16,
             policy: Replacement::default(),
             nodes: None,
-            loading: Loading::Asynchronous { loaders: 8 },
+            loading: Loading::Asynchronous { loaders: 16 },
             direct: false,
         }
     }

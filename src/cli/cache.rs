@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "sync,async")]
     loading: Vec<String>,
     /// Threads that read, if they are threads of their own
-    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(long, value_name = "N", default_value_t = 16)]
     loaders: usize,
     /// Bytes of a block: 4096, 8192, 16384, 32768 or 65536
     #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]

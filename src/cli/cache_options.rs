@@ -27,7 +27,7 @@ pub struct CacheArgs {
     #[arg(long, value_name = "async|sync", default_value = "async")]
     loading: String,
     /// Threads that read, if they are threads of their own
-    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(long, value_name = "N", default_value_t = 16)]
     loaders: usize,
     /// A cache of its own for nodes, as PART:POLICY: the part (0.01 to 0.99) of the memory that it has
     #[arg(long, value_name = "PART:POLICY")]

@@ -114,6 +114,9 @@ impl<'a, S: Surface> Renderer<'a, S> {
             samples,
         };
 
+        if let Some(cached) = self.accel.cached() {
+            cached.begin_frame();
+        }
         let mut tiled = TiledFrame::new(size, aovs);
         let mut jobs = tiled.split(&self.tiles);
         // What the last frame has used last is there still: this one begins with it.

@@ -21,6 +21,11 @@ use choice::Choice;
 /// The kernels that it chooses among.
 const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
 
+/// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
+/// who uses both needs both in memory. On a power plant of which 16 % were in memory, packets alone read 28 %
+/// fewer blocks and were a fifth faster.
+const FRUGAL: usize = 1;
+
 /// Fewer rays than this say nothing about a kernel: reading the clock takes as long.
 const LEAST_RAYS: u32 = 64;
 
@@ -85,6 +90,10 @@ impl Dispatch {
 #[inline(always)]
 fn timed(accel: &Accel, choice: &mut Choice<{ WAYS.len() }>, active: &[u32], trace: impl FnOnce(Kernel)) {
     let rays: u32 = active.iter().map(|lanes| lanes.count_ones()).sum();
+    if accel.cached().is_some_and(|cached| cached.is_short()) {
+        trace(WAYS[FRUGAL]);
+        return;
+    }
     if rays < LEAST_RAYS {
         trace(WAYS[choice.quickest()]);
         return;
