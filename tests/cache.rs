@@ -1,0 +1,127 @@
+//! Scene files of which a part is in memory, on the command line: the same pictures, within the memory given,
+//! and clear errors where that does not do.
+
+mod common;
+
+use common::Place;
+
+/// A folder with the scene file of a plant.
+fn place(triangles: u32) -> Place {
+    let place = Place::new();
+    place.succeed(&format!("generate plant --triangles {triangles} --seed 5 -o plant.ply"));
+    place.succeed("build plant.ply -o plant.rpk");
+    place
+}
+
+const VIEW: &str = "--size 160x120 --threads 2 --orbit 3";
+
+#[test]
+fn pictures_are_the_same_within_the_memory_given() {
+    let place = place(400_000);
+    place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));
+    // What the process takes anyway is in it, so that a debug build has to have some room.
+    const BUDGET: u64 = 48 << 20;
+    for how in ["", "--loading sync --policy lru --block 16384", "--nodes 0.3:fifo --ways 4 --stripes 3"] {
+        place.succeed(&format!("render plant.rpk -o part.png {VIEW} --memory 48MiB {how} --json part.json"));
+        for frame in 0..3 {
+            let [part, whole] = ["part", "whole"].map(|name| place.read(&format!("{name}_00{frame}.png")));
+            assert!(part == whole, "frame {frame} {how}");
+        }
+        let report = place.json("part.json");
+        let cache = &report["cache"];
+        let number = |key: &str| cache[key].as_u64().unwrap_or_else(|| panic!("{key} in {cache}"));
+        assert_eq!(number("budget"), BUDGET);
+        assert!(number("data") > 30 << 20, "the scene is too small for this test: {cache}");
+        assert!(number("peak_blocks") < number("data"), "{cache}");
+        assert!(number("loads") > 0 && number("bytes_read") >= number("loads") * 1000, "{cache}");
+        let hits = cache["hit_ratio"].as_f64().expect("a share");
+        assert!((0.3..1.0).contains(&hits), "{cache}");
+        if cfg!(target_os = "linux") {
+            assert!(number("peak_resident") <= BUDGET, "{how}: {cache}");
+        }
+    }
+    let text = place.succeed("render plant.rpk -o part.png --size 64x48 --memory 48MiB");
+    assert!(text.contains("of 48.0 MiB at most") && text.contains("% of uses hit"), "{text}");
+}
+
+#[test]
+fn too_little_memory_and_nonsense_are_refused_beforehand() {
+    let place = place(20_000);
+    for (options, expected) in [
+        ("--memory 1MiB", &["--memory: 1 MiB is too little for this scene: it takes at least"][..]),
+        ("--memory much", &["--memory: \"much\" is no size"]),
+        ("--memory 1GiB --policy mru", &["--policy: \"mru\" is none of fifo, lru"]),
+        ("--memory 1GiB --block 5000", &["--block: 5000 is not a power of two"]),
+        ("--memory 1GiB --ways 0", &["--ways: 0"]),
+        ("--memory 1GiB --loading never", &["--loading: \"never\" is neither async nor sync"]),
+        ("--memory 1GiB --nodes 2:lru", &["--nodes: 2 is not a share"]),
+        ("--memory 1GiB --nodes half", &["--nodes: \"half\" is not PART:POLICY"]),
+        ("--memory 1GiB --accuracy fast", &["--accuracy: fast keeps a record of every triangle"]),
+        ("--memory 1GiB --heatmap steps", &["--heatmap: it walks a tree that is all in memory"]),
+    ] {
+        place.fail(&format!("render plant.rpk -o out.png {options}"), expected);
+    }
+    place.fail(
+        "cache plant.ply",
+        &["plant.ply: unknown kind of file (.ply); a cache needs a .rpk scene file"],
+    );
+    place.fail("cache plant.rpk --policies lru,best", &["--policies: \"best\" is none of"]);
+    place.fail("cache plant.rpk --budgets 0", &["--budgets: 0 is not a share"]);
+    place.fail("cache plant.rpk --frames 0", &["--frames: 0"]);
+    place.fail("cache plant.rpk --plot out.gif", &["out.gif: unknown kind of file"]);
+    place.fail("cache plant.rpk --budgets 1", &["--memory: ", "is too little for this scene"]);
+}
+
+#[test]
+fn a_block_that_is_damaged_ends_the_frame_with_its_place() {
+    let place = place(50_000);
+    // A bit in each block of the triangles, which lie at the place that info tells.
+    place.succeed("info plant.rpk --json info.json");
+    let info = place.json("info.json");
+    let sections = info["file"]["sections"].as_array().expect("sections");
+    let triangles = sections.iter().find(|section| section["kind"] == "triangles").expect("has triangles");
+    let [offset, bytes] = ["offset", "bytes"].map(|key| triangles[key].as_u64().expect(key) as usize);
+    let mut file = place.read("plant.rpk");
+    for block in (offset..offset + bytes).step_by(4096) {
+        file[block + 7] ^= 4;
+    }
+    place.write("damaged.rpk", &file);
+    for loading in ["sync", "async"] {
+        place.fail(
+            &format!("render damaged.rpk -o out.png --size 64x48 --memory 1GiB --loading {loading}"),
+            &["damaged.rpk: its triangles are damaged at byte", "build it again"],
+        );
+    }
+}
+
+#[test]
+fn a_flight_tells_what_each_cache_did() {
+    let place = place(150_000);
+    let text = place.succeed(
+        "cache plant.rpk --frames 3 --size 96x96 --budgets 40,400 --policies lru,sieve --loading sync,async \
+         --loaders 3 --threads 2 --json flight.json --plot flight.svg",
+    );
+    assert!(text.is_empty() || text.contains("resident"), "{text}");
+    let report = place.json("flight.json");
+    let rows = report["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 1 + 2 * 2 * 2 * 2);
+    assert!(rows[0]["policy"].is_null() && rows[0]["rays_per_s"].as_f64().expect("a rate") > 0.0);
+    let blocks = report["data_bytes"].as_u64().expect("a number") / 4096 + 5;
+    let mut cold_loads = 0;
+    for row in &rows[1..] {
+        let number = |key: &str| row[key].as_u64().unwrap_or_else(|| panic!("{key} in {row}"));
+        assert_eq!(row["frames"].as_array().expect("frames").len(), 3);
+        assert!(number("minimum") <= number("loads") + number("held"), "{row}");
+        let warm = row["warm"].as_bool().expect("warm or not");
+        let evictions = |frame: &serde_json::Value| frame["cache"]["evictions"].as_u64().expect("a number");
+        let evicted: u64 = row["frames"].as_array().expect("frames").iter().map(evictions).sum();
+        if row["budget"].as_f64().expect("a share") > 1.0 {
+            // Everything fits: what was read once is not read again.
+            assert_eq!(evicted, 0, "{row}");
+            cold_loads = number("loads") + if warm { cold_loads } else { 0 };
+            assert!(cold_loads <= blocks, "{row}");
+        }
+    }
+    let plot = String::from_utf8(place.read("flight.svg")).expect("text");
+    assert!(plot.contains("40 % in memory, warm") && plot.contains("sieve async"), "it is a plot");
+}
