@@ -1,15 +1,10 @@
 //! Scene files on the command line: built once, and taken by every command as the model itself would be.
 
-use assert_cmd::Command;
+mod common;
+
+use common::Place;
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
-
-/// A folder to run in, with models of each kind of colours.
-struct Place {
-    folder: TempDir,
-}
 
 /// A roof of two slopes over a floor; what vertices and faces have beside goes in.
 fn house(vertex: &str, vertex_color: impl Fn(usize) -> String, face: &str, face_colors: [&str; 3]) -> String {
@@ -29,79 +24,30 @@ const COLOR: &str = "property uchar red\nproperty uchar green\nproperty uchar bl
 /// The models, one for each kind of colours.
 const MODELS: [&str; 4] = ["plain.ply", "faces.ply", "vertices.ply", "materials.obj"];
 
-impl Place {
-    fn new() -> Self {
-        let place = Self { folder: tempfile::tempdir().expect("a folder") };
-        let none = |_| String::new();
-        place.write("plain.ply", house("", none, "", [""; 3]));
-        place.write("faces.ply", house("", none, COLOR, ["200 200 190", "220 60 50", "60 90 200"]));
-        let rainbow = |i: usize| format!(" {} {} {}", 30 * i, 255 - 20 * i, 77);
-        place.write("vertices.ply", house(COLOR, rainbow, "", [""; 3]));
-        place.write("m.mtl", "newmtl brick\nKd 0.5 0.1 0.1\nnewmtl slate\nKd 0.2 0.25 0.3\n");
-        place.write(
-            "materials.obj",
-            "mtllib m.mtl\nv -1 1 -1\nv 1 1 -1\nv 0 2 1\nv -1 1 1\nusemtl slate\nf 1 3 2\nusemtl brick\nf 1 4 3\n",
-        );
-        place
-    }
+/// A folder to run in, with models of each kind of colours.
+fn models() -> Place {
+    let place = Place::new();
+    let none = |_| String::new();
+    place.write("plain.ply", house("", none, "", [""; 3]));
+    place.write("faces.ply", house("", none, COLOR, ["200 200 190", "220 60 50", "60 90 200"]));
+    let rainbow = |i: usize| format!(" {} {} {}", 30 * i, 255 - 20 * i, 77);
+    place.write("vertices.ply", house(COLOR, rainbow, "", [""; 3]));
+    place.write("m.mtl", "newmtl brick\nKd 0.5 0.1 0.1\nnewmtl slate\nKd 0.2 0.25 0.3\n");
+    place.write(
+        "materials.obj",
+        "mtllib m.mtl\nv -1 1 -1\nv 1 1 -1\nv 0 2 1\nv -1 1 1\nusemtl slate\nf 1 3 2\nusemtl brick\nf 1 4 3\n",
+    );
+    place
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
-        fs::write(self.path(name), bytes).expect("written");
-    }
-
-    fn read(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).expect("there")
-    }
-
-    fn raypack(&self, arguments: &str) -> Command {
-        let mut command = Command::cargo_bin("raypack").expect("it was built");
-        command.current_dir(self.folder.path()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
-        command
-    }
-
-    /// Runs it to success and returns what it printed.
-    fn succeed(&self, arguments: &str) -> String {
-        let output = self.raypack(arguments).assert().success().get_output().clone();
-        assert_eq!(String::from_utf8_lossy(&output.stderr), "", "{arguments}");
-        String::from_utf8(output.stdout).expect("text")
-    }
-
-    fn report(&self, arguments: &str) -> Value {
-        serde_json::from_str(&self.succeed(&format!("{arguments} --json -"))).expect("JSON")
-    }
-
-    /// Runs it to failure: exit code 1, one line on standard error that holds all of `expected`, and no file that
-    /// was not there before.
-    fn fail(&self, arguments: &str, expected: &[&str]) {
-        let before = self.files();
-        let output = self.raypack(arguments).assert().code(1).stdout("").get_output().clone();
-        let message = String::from_utf8(output.stderr).expect("text");
-        assert!(message.starts_with("raypack: error: "), "{arguments}: {message}");
-        assert_eq!(message.matches('\n').count(), 1, "{arguments}: {message}");
-        for part in expected {
-            assert!(message.contains(part), "{arguments}: \"{part}\" is not in: {message}");
-        }
-        assert_eq!(self.files(), before, "{arguments} left something behind");
-    }
-
-    /// The files and folders here.
-    fn files(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("a folder");
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
-            .collect();
-        names.sort();
-        names
-    }
+/// Runs it to success and returns its report.
+fn report(place: &Place, arguments: &str) -> Value {
+    serde_json::from_str(&place.succeed(&format!("{arguments} --json -"))).expect("JSON")
 }
 
 #[test]
 fn pictures_of_a_model_and_of_its_scene_file_are_the_same() {
-    let place = Place::new();
+    let place = models();
     for model in MODELS {
         place.succeed(&format!("build {model} -o scene.rpk"));
         let options = "--size 61x43 --samples 2 --depth depth.exr --normals normals.exr";
@@ -120,7 +66,7 @@ fn pictures_of_a_model_and_of_its_scene_file_are_the_same() {
 
 #[test]
 fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
-    let place = Place::new();
+    let place = models();
     let rays: Vec<f32> = (0..100)
         .flat_map(|i| {
             [(i % 10) as f32 * 0.3 - 1.4, 9.0, (i / 10) as f32 * 0.3 - 1.4, 0.0, 0.0, -1.0, 0.0, 99.0]
@@ -136,8 +82,8 @@ fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
         place.succeed(&format!("build {model} -o scene.rpk"));
         for any in ["", "--any"] {
             let hits = |scene: &str| {
-                let report = place.report(&format!("cast {scene} --rays rays.npy -o hits.npz {any}"));
-                assert!(report["hits"].as_u64() > Some(20), "{report}");
+                let said = report(&place, &format!("cast {scene} --rays rays.npy -o hits.npz {any}"));
+                assert!(said["hits"].as_u64() > Some(20), "{said}");
                 place.read("hits.npz")
             };
             assert!(hits(model) == hits("scene.rpk"), "{model} {any}");
@@ -147,38 +93,38 @@ fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
 
 #[test]
 fn build_says_what_it_did() {
-    let place = Place::new();
+    let place = models();
     let text = place.succeed("build faces.ply -o scene.rpk --preset best");
     for expected in
         ["faces.ply", "triangles  4 with 8 vertices", "repaired", "build ", "tree ", "scene.rpk, "]
     {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
     }
-    let report = place.report("build faces.ply -o scene.rpk --preset best");
-    assert_eq!(report["bytes"], fs::metadata(place.path("scene.rpk")).expect("there").len());
-    assert_eq!(report["build_params"]["preset"], "best");
-    assert_eq!(report["models"][0]["read_report"]["polygons"], 1);
-    assert!(report["tree"]["nodes"].as_u64() > Some(0) && report["build_seconds"].as_f64() > Some(0.0));
-    assert_eq!(report["sections"][0]["kind"], "meta");
+    let said = report(&place, "build faces.ply -o scene.rpk --preset best");
+    assert_eq!(said["bytes"], fs::metadata(place.path("scene.rpk")).expect("there").len());
+    assert_eq!(said["build_params"]["preset"], "best");
+    assert_eq!(said["models"][0]["read_report"]["polygons"], 1);
+    assert!(said["tree"]["nodes"].as_u64() > Some(0) && said["build_seconds"].as_f64() > Some(0.0));
+    assert_eq!(said["sections"][0]["kind"], "meta");
 }
 
 #[test]
 fn several_models_become_one_scene() {
-    let place = Place::new();
+    let place = models();
     let text = place.succeed("build plain.ply faces.ply materials.obj -o scene.rpk");
     assert!(text.contains("3 models") && text.contains("10 with 22 vertices"), "{text}");
-    let report = place.report("info scene.rpk");
-    assert_eq!(report["triangles"], 10);
-    assert_eq!(report["source"], "plain.ply, faces.ply, materials.obj");
-    assert_eq!(report["colors"]["kind"], "per material");
-    let report = place.report("build scene.rpk vertices.ply -o more.rpk");
-    assert_eq!((&report["triangles"], &report["models"][0]["triangles"]), (&14.into(), &10.into()));
-    assert_eq!(place.report("info more.rpk")["colors"]["kind"], "per vertex");
+    let said = report(&place, "info scene.rpk");
+    assert_eq!(said["triangles"], 10);
+    assert_eq!(said["source"], "plain.ply, faces.ply, materials.obj");
+    assert_eq!(said["colors"]["kind"], "per material");
+    let said = report(&place, "build scene.rpk vertices.ply -o more.rpk");
+    assert_eq!((&said["triangles"], &said["models"][0]["triangles"]), (&14.into(), &10.into()));
+    assert_eq!(report(&place, "info more.rpk")["colors"]["kind"], "per vertex");
 }
 
 #[test]
 fn info_shows_and_proves_what_is_in_a_scene_file() {
-    let place = Place::new();
+    let place = models();
     place.succeed("build vertices.ply -o scene.rpk --preset preview");
     let text = place.succeed("info scene.rpk --verify --validate");
     for expected in [
@@ -194,7 +140,7 @@ fn info_shows_and_proves_what_is_in_a_scene_file() {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
     }
     let [model, scene] =
-        ["info vertices.ply --preset preview", "info scene.rpk"].map(|command| place.report(command));
+        ["info vertices.ply --preset preview", "info scene.rpk"].map(|command| report(&place, command));
     for same in ["tree", "colors", "shapes", "random_rays", "bounds", "triangles", "vertices"] {
         assert_eq!(model[same], scene[same], "{same}");
     }
@@ -205,19 +151,19 @@ fn info_shows_and_proves_what_is_in_a_scene_file() {
 
 #[test]
 fn commands_that_build_take_the_mesh() {
-    let place = Place::new();
+    let place = models();
     place.succeed("build faces.ply -o scene.rpk");
     let bench = "--size 16 --rays camera --engines raypack --modes single --threads 1 --seconds 0 --rounds 3";
-    let report = place.report(&format!("bench scene.rpk {bench} --preset best"));
-    assert_eq!(report["header"]["triangles"], 4);
+    let said = report(&place, &format!("bench scene.rpk {bench} --preset best"));
+    assert_eq!(said["header"]["triangles"], 4);
     let accuracy = "--size 8x8 --rays camera --engines raypack --samples 1 --seconds 0 --oracle-rays 64";
-    place.report(&format!("accuracy scene.rpk {accuracy}"));
+    report(&place, &format!("accuracy scene.rpk {accuracy}"));
     place.succeed("tune scene.rpk -o tuned.toml --minutes 0.05 --size 16x16");
 }
 
 #[test]
 fn a_damaged_scene_file_is_refused_by_every_command() {
-    let place = Place::new();
+    let place = models();
     place.succeed("build faces.ply -o scene.rpk");
     let bytes = place.read("scene.rpk");
     let commands =
@@ -251,19 +197,23 @@ fn a_damaged_scene_file_is_refused_by_every_command() {
 
 #[test]
 fn options_that_a_built_tree_cannot_have_are_refused() {
-    let place = Place::new();
+    let place = models();
     place.succeed("build faces.ply -o scene.rpk");
+    let refused = |command: &str, option: &str, value: &str| {
+        place.fail(&format!("{command} {option} {value}"), &[option, "scene.rpk is built already"]);
+    };
     for command in ["render scene.rpk -o a.png", "info scene.rpk", "cast scene.rpk --rays r.npy -o h.npz"] {
-        for (option, given) in [("--preset", "--preset best"), ("--memory", "--memory 1GiB")] {
-            place.fail(&format!("{command} {given}"), &[option, "scene.rpk is built already"]);
-        }
+        refused(command, "--preset", "best");
+    }
+    for command in ["info scene.rpk", "cast scene.rpk --rays r.npy -o h.npz"] {
+        refused(command, "--memory", "1GiB");
     }
     place.fail("info faces.ply --verify", &["--verify", "faces.ply has no checksums"]);
 }
 
 #[test]
 fn build_refuses_before_it_works() {
-    let place = Place::new();
+    let place = models();
     place.fail("build nowhere.ply -o scene.ply", &["scene.ply", ".rpk"]);
     place.fail("build nowhere.ply -o no/scene.rpk", &["cannot write no/scene.rpk"]);
     place.fail("build nowhere.ply -o scene.rpk", &["cannot read nowhere.ply"]);

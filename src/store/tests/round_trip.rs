@@ -130,13 +130,18 @@ fn the_file_is_laid_out_as_documented() {
 }
 
 #[test]
-fn the_document_names_every_section() {
+fn the_document_names_every_section_and_member() {
     let document = include_str!("../format.md");
     for kind in Kind::ALL {
         let row = format!("| {} | `{}` | {} |", *kind as u32, kind.name(), kind.element());
         assert!(document.contains(&row), "format.md lacks \"{row}\"");
     }
     assert!(document.contains(&format!("version {VERSION}")));
+    let place = Place::with(&meshes()[0]);
+    let meta = serde_json::to_value(place.open().expect("opens").meta()).expect("plain data");
+    for member in meta.as_object().expect("an object").keys() {
+        assert!(document.contains(&format!("`{member}`")), "format.md lacks the member {member}");
+    }
 }
 
 #[test]
