@@ -28,6 +28,10 @@ const READERS: usize = 4096;
 /// What lengths of reads are multiples of: what checksums are for.
 const READ: usize = 4096;
 
+/// Squares of a picture that a tick is long. Every block's first use in a tick is written down, which took a
+/// third of the time when a tick was one square.
+const SESSIONS_PER_TICK: u32 = 16;
+
 /// Requests that wait for a loader.
 const QUEUE: usize = 256;
 
@@ -40,8 +44,8 @@ pub struct Blocks {
     pub epochs: Arc<Epochs>,
     /// For threads that are at work: none, if each waits at its own place.
     pub gate: Option<Gate>,
-    /// Counts tiles, to tell uses apart.
-    pub tick: AtomicU32,
+    /// Sessions so far: see [`tick`](Self::tick).
+    pub sessions: AtomicU32,
     pub counters: Counters,
     pins: Pins,
     quota: Quota,
@@ -85,7 +89,7 @@ impl Blocks {
             words: Words::new(count),
             epochs: Epochs::new(READERS),
             gate,
-            tick: AtomicU32::new(0),
+            sessions: AtomicU32::new(0),
             counters: Counters::default(),
             pins: Pins::new(count),
             quota: Quota::new(plan.pinned),
@@ -108,11 +112,18 @@ impl Blocks {
                 let (blocks, requests): (_, Receiver<u32>) = (Arc::clone(&blocks), requests.clone());
                 let loader = thread::Builder::new().name(format!("loader-{number}"));
                 loaders.threads.push(loader.spawn(move || {
-                    requests.iter().for_each(|block| blocks.load(block));
+                    for block in &requests {
+                        blocks.load(block, false);
+                    }
                 })?);
             }
         }
         Ok((blocks, loaders))
+    }
+
+    /// What tells uses apart: a use in the same tick is the same use.
+    pub fn tick(&self) -> u32 {
+        self.sessions.load(Ordering::Relaxed) / SESSIONS_PER_TICK
     }
 
     /// Memory that is taken for `count` blocks beside their own.
@@ -127,10 +138,17 @@ impl Blocks {
         other.as_ref().filter(|_| second).or(first.as_ref()).expect("there is a first directory")
     }
 
-    /// Pins blocks and has all of them come. The caller must be in no epoch and have no place at the gate,
-    /// for who has one must not wait for those who are to give up pins when they have one again.
-    pub fn gather(&self, loaders: &Loaders, wanted: &[u32]) -> Gathered<'_> {
-        let taken = self.quota.take(wanted.len());
+    /// Pins blocks and has all of them come. The caller must be in no epoch.
+    ///
+    /// `aside` is called before anything is waited for that another thread may have to have a place at the
+    /// gate for: the caller must have none then.
+    pub fn gather(&self, loaders: &Loaders, wanted: &[u32], aside: impl FnOnce()) -> Gathered<'_> {
+        let mut aside = Some(aside);
+        let mut step_aside = || aside.take().map_or((), |aside| aside());
+        let taken = self.quota.try_take(wanted.len()).unwrap_or_else(|| {
+            step_aside();
+            self.quota.take(wanted.len())
+        });
         let (mut absent, mut missed) = (Vec::new(), 0);
         for &block in wanted {
             let gone = &mut |gone| self.retire(gone);
@@ -142,12 +160,22 @@ impl Blocks {
         }
         match &loaders.requests {
             Some(requests) => {
-                absent.iter().for_each(|&block| requests.send(block).expect("loaders outlive who waits"));
+                // What the system has in memory is copied sooner than it is asked for.
+                absent.retain(|&block| !self.load(block, true));
+                for &block in &absent {
+                    step_aside();
+                    requests.send(block).expect("loaders outlive who waits");
+                }
             }
-            None => absent.iter().for_each(|&block| self.load(block)),
+            None => absent.iter().for_each(|&block| {
+                self.load(block, false);
+            }),
         }
         for &block in wanted {
-            self.directory(block).wait(block);
+            if !self.words.is_here(block as usize) {
+                step_aside();
+                self.directory(block).wait(block);
+            }
         }
         add(&self.counters.misses, missed);
         Gathered { blocks: self, pinned: wanted.to_vec(), taken }
@@ -221,9 +249,10 @@ impl Blocks {
         }
     }
 
-    /// Brings a block that the directory has said is absent.
-    fn load(&self, block: u32) {
-        let tick = self.tick.load(Ordering::Relaxed);
+    /// Brings a block that the directory has said is absent; with `at_once` only if nothing has to be waited
+    /// for. Whether it is done, with success or without.
+    fn load(&self, block: u32, at_once: bool) -> bool {
+        let tick = self.tick();
         // It may have been given up just now: then it is still where it was.
         let kept = {
             let mut retired = self.retired();
@@ -232,7 +261,7 @@ impl Blocks {
         };
         if kept {
             self.directory(block).arrived(block, &self.words, tick);
-            return;
+            return true;
         }
         self.make_room();
         let start = Instant::now();
@@ -241,25 +270,47 @@ impl Blocks {
         // the directory tells one thread alone to load it.
         let into =
             unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ)) };
-        let read =
-            if self.has_failed() { Ok(false) } else { self.source.read(array, byte, into).map(|()| true) };
+        let read = if self.has_failed() {
+            // Everybody gives up.
+            self.lose(block);
+            return true;
+        } else if at_once {
+            self.source.read_at_once(array, byte, into)
+        } else {
+            self.source.read(array, byte, into).map(|()| true)
+        };
         match read {
             Ok(true) => {
                 add(&self.counters.loads, 1);
                 add(&self.counters.bytes_read, bytes as u64);
                 add(&self.counters.loading_ns, nanos(start.elapsed()));
                 self.directory(block).arrived(block, &self.words, tick);
-                return;
+                true
             }
-            Ok(false) => {}
+            Ok(false) => {
+                // A loader will come back to it, and find the room again.
+                self.give_room(block);
+                false
+            }
             Err(error) => {
                 self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 self.failed.store(true, Ordering::Release);
+                self.lose(block);
+                true
             }
         }
+    }
+
+    /// Gives back the memory of a block that has not come.
+    fn give_room(&self, block: u32) {
         // SAFETY: it never was here.
         unsafe { self.release(block) };
         self.committed.fetch_sub(1, Ordering::AcqRel);
+    }
+
+    /// Says that a block will not come.
+    fn lose(&self, block: u32) {
+        self.give_room(block);
         self.directory(block).failed(block);
     }
 
@@ -349,6 +400,14 @@ mod tests {
             into.as_chunks_mut::<4>().0.fill(((byte / BLOCK) as u32 + 1).to_le_bytes());
             Ok(())
         }
+
+        fn read_at_once(&self, array: Array, byte: usize, into: &mut [u8]) -> crate::error::Result<bool> {
+            // Of every third block something is there, but not all.
+            let is_whole = !(byte / BLOCK).is_multiple_of(3);
+            let count = if is_whole { into.len() } else { 100 };
+            self.read(array, byte, &mut into[..count])?;
+            Ok(is_whole)
+        }
     }
 
     /// Threads that ask for blocks at random, hold some for a while, and look whether they are what they
@@ -374,7 +433,7 @@ mod tests {
                     let local = Local::take(blocks);
                     for _ in 0..rounds {
                         let wanted: Vec<u32> = (0..=random(most)).map(|_| random(BLOCKS) as u32).collect();
-                        let gathered = blocks.gather(loaders, &wanted);
+                        let gathered = blocks.gather(loaders, &wanted, || ());
                         local.reader.enter();
                         drop(gathered);
                         let found = || {

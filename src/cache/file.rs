@@ -1,5 +1,6 @@
 //! Blocks from a scene file.
 
+use super::at_once;
 use super::layout::Array;
 use super::plan::CacheOptions;
 use super::source::Source;
@@ -21,6 +22,8 @@ pub struct FileSource {
     /// Where each array begins in the file; nowhere, if it has none of that.
     offsets: [Option<u64>; Array::ALL.len()],
     checksums: Vec<u32>,
+    /// Whether reads go past the system's memory of the file.
+    direct: bool,
 }
 
 /// The section that an array is.
@@ -42,7 +45,7 @@ impl FileSource {
         let file = open(&path, direct).map_err(|source| Error::Read { path: path.clone(), source })?;
         let checksums = scene.checksums().to_vec();
         let offsets = Array::ALL.map(|array| section(scene, array).map(|section| section.offset));
-        Ok(Self { path, file, offsets, checksums })
+        Ok(Self { path, file, offsets, checksums, direct })
     }
 
     /// Memory that it takes.
@@ -53,7 +56,7 @@ impl FileSource {
 
 impl Source for FileSource {
     fn read(&self, array: Array, byte: usize, into: &mut [u8]) -> Result<()> {
-        let offset = self.offsets[array as usize].expect("blocks are those of sections") + byte as u64;
+        let offset = self.offset(array, byte);
         read_at(&self.file, into, offset).map_err(|source| {
             let source = if source.kind() == io::ErrorKind::UnexpectedEof {
                 io::Error::new(source.kind(), "it has become shorter since it was opened; build it again")
@@ -62,6 +65,26 @@ impl Source for FileSource {
             };
             Error::Read { path: self.path.clone(), source }
         })?;
+        self.check(array, offset, into)
+    }
+
+    fn read_at_once(&self, array: Array, byte: usize, into: &mut [u8]) -> Result<bool> {
+        let offset = self.offset(array, byte);
+        // Whatever goes wrong here goes wrong once more where it is told.
+        Ok(!self.direct && at_once::read_at(&self.file, into, offset) && {
+            self.check(array, offset, into)?;
+            true
+        })
+    }
+}
+
+impl FileSource {
+    fn offset(&self, array: Array, byte: usize) -> u64 {
+        self.offsets[array as usize].expect("blocks are those of sections") + byte as u64
+    }
+
+    /// Checks what was read at an offset of the file.
+    fn check(&self, array: Array, offset: u64, into: &[u8]) -> Result<()> {
         let first = offset as usize / store::BLOCK;
         let pieces = into.chunks(store::BLOCK).zip(&self.checksums[first..]);
         for (number, (piece, &checksum)) in (first..).zip(pieces) {

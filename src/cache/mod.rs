@@ -9,11 +9,14 @@
 //! kernel -- enter --> words: here? ---- yes --> go on (one load for each block)
 //!                       | no
 //!                       v
-//!                  leave the epoch, step aside -----------> another thread traces meanwhile
+//!                  leave the epoch
 //!                  quota: may I pin so many?
 //!                  directory (a stripe's lock): pin, ask;  what must go is declared gone, and retired
+//!                  does the system have it in memory? then copy it, check, arrive
+//!                  else step aside ------------------------> another thread traces meanwhile
 //!                  loaders: room? read, check, arrive      (or the thread itself: synchronous loading)
-//!                  wait; step back, enter an epoch, unpin
+//!                  wait; step back
+//!                  enter an epoch, unpin
 //! ```
 //!
 //! | file | what |
@@ -27,7 +30,7 @@
 //! | `blocks` | all of these at work: asking, loading, giving up |
 //! | `local`, `view` | a thread's state, and the tree as it sees it |
 //! | `plan` | how the memory is divided |
-//! | `source`, `file` | where blocks come from |
+//! | `source`, `file`, `at_once` | where blocks come from |
 //!
 //! **Waiting is a thread's.** More threads than processors take part; one that waits for a block keeps its
 //! tile on its stack and lets another have its place. So the kernels need not be cut into pieces that can be
@@ -37,6 +40,7 @@
 //! threads that need it and becomes an error of the frame: [`Cached::or_error`].
 
 mod arena;
+mod at_once;
 mod blocks;
 mod directory;
 mod epoch;
@@ -211,7 +215,7 @@ impl Cached {
         let mut local = Local::take(&self.blocks);
         local.begin_at_gate();
         local.put();
-        self.blocks.tick.fetch_add(1, Ordering::Relaxed);
+        self.blocks.sessions.fetch_add(1, Ordering::Relaxed);
         Session { cached: self }
     }
 

@@ -29,6 +29,14 @@ impl Quota {
         count
     }
 
+    /// The same if they are there at once.
+    pub fn try_take(&self, count: usize) -> Option<usize> {
+        let count = count.min(self.all);
+        let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        *left = left.checked_sub(count)?;
+        Some(count)
+    }
+
     /// Gives `count` back.
     pub fn give(&self, count: usize) {
         *self.left.lock().unwrap_or_else(PoisonError::into_inner) += count;
@@ -58,6 +66,8 @@ mod tests {
                 });
             }
         });
-        assert_eq!(quota.take(10), 10);
+        assert_eq!(quota.try_take(4), Some(4));
+        assert_eq!(quota.try_take(7), None);
+        assert_eq!(quota.take(6), 6);
     }
 }

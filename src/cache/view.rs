@@ -10,7 +10,6 @@ use crate::geometry::triangle::Triangle;
 use crate::kdtree::{Node, Scale, Tree};
 use std::ops::Range;
 use std::panic;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// A tree whose blocks are fetched before a walk looks at them.
@@ -74,7 +73,7 @@ impl<'a> View<'a> {
             pages: Part::new(blocks, Array::Pages),
             triangles: Part::new(blocks, Array::Triangles),
             shift: blocks.layout.shift(),
-            tick: blocks.tick.load(Ordering::Relaxed),
+            tick: blocks.tick(),
             local: Some(local),
         }
     }
@@ -161,9 +160,14 @@ impl<'a> View<'a> {
         let (blocks, local) = (&self.cached.blocks, self.local());
         let start = Instant::now();
         local.reader.leave();
-        local.step_aside();
-        let gathered = blocks.gather(&self.cached.loaders, wanted);
-        local.step_back();
+        let mut is_aside = false;
+        let gathered = blocks.gather(&self.cached.loaders, wanted, || {
+            local.step_aside();
+            is_aside = true;
+        });
+        if is_aside {
+            local.step_back();
+        }
         // Before they are let go of, so that the epoch protects them from then on.
         local.reader.enter();
         drop(gathered);
