@@ -42,8 +42,9 @@
 //! | [`geometry`] | ray, hit, box, the ray-triangle tests, clipping |
 //! | [`mesh`] | triangle meshes, readers of model files, generators |
 //! | [`kdtree`] | the tree: builder, statistics, validation |
-//! | [`traverse`] | the kernels that take rays through a tree |
 //! | [`store`] | the `.rpk` scene file: written whole, mapped when it is read |
+//! | [`cache`] | scenes of which a part is in memory: blocks that come from a scene file when they are needed |
+//! | [`traverse`] | the kernels that take rays through a tree |
 //! | [`scene`] | camera, camera paths, lights |
 //! | [`render`] | tiles, their scheduler, shading, pictures |
 //! | [`batch`] | rays in bulk on all processors, and NumPy's files of them |

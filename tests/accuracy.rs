@@ -196,7 +196,13 @@ fn within_picks_the_most_accurate_that_fits() {
 
     let report = place.report(&format!("{few} --samples 1,4 --within 0.001us"));
     let within = &report["within"];
-    assert_eq!((&within["fits"], &within["picked"]["samples"]), (&false.into(), &1.into()));
+    assert_eq!(within["fits"], false);
+    // Whichever that was in this run: frames of 16 by 16 take so little that noise may decide.
+    let frames = report["frames"].as_array().unwrap().iter();
+    let quickest = frames.min_by(|a, b| number(a, "ms").total_cmp(&number(b, "ms"))).unwrap();
+    for key in ["accuracy", "samples"] {
+        assert_eq!(within["picked"][key], quickest[key], "{key}");
+    }
     assert!(number(&within["picked"], "ms") > number(within, "budget_ms"));
 
     let run = place.accuracy(&format!("{few} --samples 1 --within 0.001us")).assert().success();

@@ -4,11 +4,11 @@ use super::policy::Replacement;
 use super::*;
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{Arrays, BuildParams, KdTree, Tree};
-use crate::mesh::Mesh;
+use crate::mesh::{Colors, Material, Mesh};
 use crate::mesh::generate::plant::{self, PlantParams};
 use crate::mesh::generate::shapes;
 use crate::render::{Frame, RenderSettings, Renderer, Size};
-use crate::scene::{Camera, Lighting};
+use crate::scene::{CachedSurface, Camera, Lighting, Surface};
 use crate::traverse::{Accel, Kernel};
 use bytemuck::cast_slice;
 use glam::Vec3;
@@ -279,4 +279,77 @@ fn too_little_memory_says_how_much_will_do() {
     let error = Cached::new(resident, Box::new(scene.source()), &options, 1 << 20, 5 << 20, 2);
     let error = error.expect_err("too little").to_string();
     assert!(error.starts_with("--memory: 1 MiB is too little for this scene: it takes at least "), "{error}");
+}
+
+/// A scene file of a mesh, in a folder of its own.
+fn file_of(mesh: &Mesh) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.rpk");
+    let tree = KdTree::build(mesh, &BuildParams::default(), None).expect("builds");
+    crate::store::write(&path, mesh, &tree, "a test", &|_| ()).expect("written");
+    (folder, path)
+}
+
+/// A frame of what is open.
+fn frame_of<S: Surface>(accel: &Accel, surface: &S, bounds_of: &Accel) -> Result<Frame> {
+    let mut settings = RenderSettings::new(Size { width: 64, height: 48 });
+    settings.tuning.threads = 2;
+    let camera = Camera::framing(&bounds_of.bounds(), 1.0);
+    let lighting = Lighting::for_view(&camera, bounds_of);
+    let renderer = Renderer::new(accel, surface, settings).expect("sensible");
+    Ok(renderer.frame_with_progress(&camera, &lighting, &AtomicUsize::new(0))?.0)
+}
+
+#[test]
+fn colors_of_all_kinds_come_from_files_as_they_were() {
+    let mut mesh = shapes::soup(3000, 9);
+    let byte = |i: usize, k: usize| (i * k % 251) as u8;
+    let rgb = |i: usize| [byte(i, 7), byte(i, 31), byte(i, 101)];
+    let material = |i: usize| Material { name: format!("m{i}"), diffuse: Vec3::splat(0.1 + 0.2 * i as f32) };
+    let count = mesh.triangles.len();
+    for colors in [
+        Colors::Uniform(Vec3::new(0.2, 0.5, 0.7)),
+        Colors::PerTriangle((0..count).map(rgb).collect()),
+        Colors::PerVertex((0..mesh.positions.len()).map(rgb).collect()),
+        Colors::PerMaterial {
+            materials: (0..4).map(material).collect(),
+            of_triangle: (0..count as u32).map(|i| i * 7 % 4).collect(),
+        },
+    ] {
+        mesh.colors = colors;
+        let scene = Scene::new(mesh.clone());
+        let expected = frame_of(&scene.resident, &mesh, &scene.resident).expect("in memory");
+        let (_folder, path) = file_of(&mesh);
+        let file = crate::store::File::open(&path).expect("opens");
+        let cached = Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 2).expect("enough");
+        let cached = Arc::new(cached);
+        let surface = CachedSurface::new(Arc::clone(&cached), &file);
+        let frame = frame_of(&Accel::of_cached(cached), &surface, &scene.resident).expect("can be read");
+        assert!(frame == expected, "{:?}", file.meta().colors);
+    }
+}
+
+#[test]
+fn a_file_that_is_replaced_stays_and_one_that_is_cut_is_an_error() {
+    let scene = Scene::new(shapes::soup(3000, 9));
+    let expected = frame_of(&scene.resident, &scene.mesh, &scene.resident).expect("in memory");
+    let (folder, path) = file_of(&scene.mesh);
+    let open = || {
+        let file = crate::store::File::open(&path).expect("opens");
+        Arc::new(Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 2).expect("enough"))
+    };
+    let cached = open();
+    let length = std::fs::metadata(&path).expect("there").len();
+    std::fs::OpenOptions::new().write(true).open(&path).expect("there").set_len(length / 4).expect("cut");
+    let error = frame_of(&Accel::of_cached(cached), &scene.mesh, &scene.resident).expect_err("it is cut");
+    assert!(error.to_string().contains("it has become shorter since it was opened"), "{error}");
+
+    let (_other, whole) = file_of(&scene.mesh);
+    std::fs::copy(whole, &path).expect("whole again");
+    let cached = open();
+    let new = folder.path().join("new");
+    std::fs::write(&new, "another file").expect("written");
+    std::fs::rename(new, &path).expect("replaced");
+    let frame = frame_of(&Accel::of_cached(cached), &scene.mesh, &scene.resident).expect("it is still open");
+    assert!(frame == expected);
 }
