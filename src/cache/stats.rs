@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Counts of a cache's work, since it was opened or [reset](Counters::take).
+/// Counts of a cache's work, since it was opened or they were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CacheStats {
     /// Uses of blocks: a tile that needs a block again and again uses it once.

@@ -13,6 +13,8 @@ use std::path::Path;
 /// Width and height of a panel, and of the lines above all.
 const PANEL: (u32, u32) = (560, 340);
 const HEADER: u32 = 60;
+/// How much wider than its lines a panel is, for the legend to stand beside them.
+const LEGEND: f64 = 1.36;
 
 /// Draws a report and writes the plot: .svg or .png.
 ///
@@ -109,13 +111,13 @@ fn draw_panel<B: DrawingBackend>(
         .margin(8)
         .x_label_area_size(32)
         .y_label_area_size(48)
-        .build_cartesian_2d(1.0..frames.max(2.0), 0.0..top.max(1e-3))?;
+        .build_cartesian_2d(1.0..1.0 + (frames.max(2.0) - 1.0) * LEGEND, 0.0..top.max(1e-3))?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .x_desc("frame")
         .y_desc("Mrays/s")
-        .x_label_formatter(&|x| format!("{x:.0}"))
+        .x_label_formatter(&|x| if *x <= frames { format!("{x:.0}") } else { String::new() })
         .label_style(("sans-serif", 11))
         .draw()?;
     if let Some(row) = resident {
