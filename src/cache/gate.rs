@@ -59,6 +59,11 @@ impl Gate {
         }
     }
 
+    /// Whether somebody waits for a place to go on with what he has begun.
+    pub fn is_wanted(&self) -> bool {
+        self.state().resuming > 0
+    }
+
     /// Gives a place back.
     pub fn leave(&self) {
         let mut state = self.state();
@@ -122,8 +127,10 @@ mod tests {
             while gate.state().resuming == 0 {
                 thread::yield_now();
             }
+            assert!(gate.is_wanted());
             gate.leave();
         });
+        assert!(!gate.is_wanted());
         assert_eq!(order.into_inner().expect("whole"), ["resumes", "begins"]);
     }
 }

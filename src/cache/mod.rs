@@ -210,8 +210,9 @@ impl Cached {
         View::new(self)
     }
 
-    /// Begins a tile, when it is this thread's turn. Queries within it are cheaper.
-    pub fn session(&self) -> Session<'_> {
+    /// Begins a square, when it is this thread's turn. Queries within it are cheaper. The turn lasts until the
+    /// thread waits for a block, or ends.
+    pub(crate) fn session(&self) -> Session<'_> {
         let mut local = Local::take(&self.blocks);
         local.begin_at_gate();
         local.put();
@@ -267,10 +268,10 @@ impl Drop for Cached {
     }
 }
 
-/// A tile's time.
+/// A square's time.
 #[must_use]
 #[derive(Debug)]
-pub struct Session<'a> {
+pub(crate) struct Session<'a> {
     cached: &'a Cached,
 }
 
