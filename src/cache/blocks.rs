@@ -28,8 +28,9 @@ const READERS: usize = 4096;
 /// What lengths of reads are multiples of: what checksums are for.
 const READ: usize = 4096;
 
-/// Squares of a picture that a tick is long. Every block's first use in a tick is written down, which took a
-/// third of the time when a tick was one square.
+/// Squares of a picture that a tick is long. Every block's first use in a tick is written down: with a tick of one
+/// square, a view of which all was in memory ran at 0.58 to 0.67 of the resident scene's speed, with this at 0.75 to
+/// 0.80.
 const SESSIONS_PER_TICK: u32 = 16;
 
 /// Requests that wait for a loader.

@@ -58,7 +58,8 @@ impl Local {
     /// Begins a use of a square's length, which waits for its turn.
     ///
     /// The place at the gate is kept from one to the next, unless somebody wants to go on who has waited for a
-    /// block: to change threads for each square took half of the time.
+    /// block: with another thread for each square, a scene of which all was in memory ran at 0.44 to 0.65 of the
+    /// resident one's speed, and so at 0.59 to 0.75.
     pub fn begin_at_gate(&mut self) {
         if self.depth == 0
             && let Some(gate) = &self.blocks.gate
