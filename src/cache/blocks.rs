@@ -8,7 +8,7 @@ use super::arena::Arena;
 use super::directory::{Asked, Directory, Pins};
 use super::epoch::Epochs;
 use super::gate::Gate;
-use super::layout::{Array, Layout};
+use super::layout::Layout;
 use super::plan::{CacheOptions, Loading, Plan};
 use super::quota::Quota;
 use super::source::Source;
@@ -264,6 +264,11 @@ impl Blocks {
             self.directory(block).arrived(block, &self.words, tick);
             return true;
         }
+        if self.has_failed() {
+            // Everybody gives up.
+            self.directory(block).failed(block);
+            return true;
+        }
         self.make_room();
         let start = Instant::now();
         let (array, byte, bytes) = self.layout.locate(block);
@@ -271,11 +276,7 @@ impl Blocks {
         // the directory tells one thread alone to load it.
         let into =
             unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ)) };
-        let read = if self.has_failed() {
-            // Everybody gives up.
-            self.lose(block);
-            return true;
-        } else if at_once {
+        let read = if at_once {
             self.source.read_at_once(array, byte, into)
         } else {
             self.source.read(array, byte, into).map(|()| true)
@@ -296,7 +297,8 @@ impl Blocks {
             Err(error) => {
                 self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 self.failed.store(true, Ordering::Release);
-                self.lose(block);
+                self.give_room(block);
+                self.directory(block).failed(block);
                 true
             }
         }
@@ -307,12 +309,6 @@ impl Blocks {
         // SAFETY: it never was here.
         unsafe { self.release(block) };
         self.committed.fetch_sub(1, Ordering::AcqRel);
-    }
-
-    /// Says that a block will not come.
-    fn lose(&self, block: u32) {
-        self.give_room(block);
-        self.directory(block).failed(block);
     }
 
     /// Whether a block could not be read: from then on none is.
@@ -371,21 +367,9 @@ impl Drop for Loaders {
     }
 }
 
-impl Array {
-    /// What messages call it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Nodes => "nodes",
-            Self::References => "references",
-            Self::Pages => "pages",
-            Self::Triangles => "triangles",
-            Self::Colors => "colours",
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::layout::Array;
     use super::super::local::Local;
     use super::super::policy::Replacement;
     use super::*;

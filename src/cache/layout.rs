@@ -20,6 +20,17 @@ pub enum Array {
 impl Array {
     /// All of them, in the order of their blocks: nodes before what leaves need.
     pub const ALL: [Self; 5] = [Self::Nodes, Self::References, Self::Pages, Self::Triangles, Self::Colors];
+
+    /// What messages call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nodes => "nodes",
+            Self::References => "references",
+            Self::Pages => "pages",
+            Self::Triangles => "triangles",
+            Self::Colors => "colours",
+        }
+    }
 }
 
 /// The least and the greatest size of a block.

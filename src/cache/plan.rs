@@ -34,7 +34,7 @@ impl Default for CacheOptions {
             stripes: 16,
             policy: Replacement::default(),
             nodes: None,
-            loading: Loading::Asynchronous { loaders: 16 },
+            loading: Loading::Asynchronous { loaders: Loading::LOADERS },
             direct: false,
         }
     }
@@ -57,6 +57,9 @@ pub enum Loading {
 const PARKED: usize = 8;
 
 impl Loading {
+    /// Loaders by themselves: where blocks came from a disk and two threads traced, 5 to 7 of them were at work.
+    pub const LOADERS: usize = 16;
+
     /// Threads that render, so that `threads` are at work when some wait.
     pub const fn workers(self, threads: usize) -> usize {
         match self {

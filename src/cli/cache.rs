@@ -1,16 +1,16 @@
 //! `raypack cache SCENE.rpk`: what caches are worth along a camera path.
 
-use super::cache_options::loading;
-use super::options::AccuracyOption;
+use super::cache_options::ShapeArgs;
+use super::options::{AccuracyOption, as_option, orbit};
 use super::outputs::same_file;
 use super::progress::Bar;
 use super::report::Json;
-use crate::cache::CacheOptions;
 use crate::cache::policy::Replacement;
 use crate::error::{Error, Result};
 use crate::files::check_writable;
 use crate::geometry::Accuracy;
-use crate::scene::{Camera, Orbit};
+use crate::render::Tuning;
+use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::store::{self, is_scene};
 use crate::study::cache::{Options, plot, run as fly};
@@ -55,25 +55,12 @@ pub struct Args {
     /// Who reads: sync, async
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "sync,async")]
     loading: Vec<String>,
-    /// Threads that read, if they are threads of their own
-    #[arg(long, value_name = "N", default_value_t = 16)]
-    loaders: usize,
-    /// Bytes of a block: 4096, 8192, 16384, 32768 or 65536
-    #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]
-    block: usize,
-    /// Blocks that a set holds
-    #[arg(long, value_name = "N", default_value_t = CacheOptions::default().ways)]
-    ways: usize,
-    /// Locks that sets share
-    #[arg(long, value_name = "N", default_value_t = CacheOptions::default().stripes)]
-    stripes: usize,
     /// A cache of its own for nodes, with this part (0.01 to 0.99) of the memory and the same policy, as in the
     /// seed paper
     #[arg(long, value_name = "PART")]
     nodes: Option<f32>,
-    /// Read past the system's own memory of the file, so that a read takes what the disk takes (Linux)
-    #[arg(long)]
-    direct: bool,
+    #[command(flatten)]
+    shape: ShapeArgs,
     /// Threads at work; 0 for all processors
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
@@ -120,21 +107,11 @@ impl Args {
 
     fn options(&self) -> Result<Options> {
         let wrong = |option: &str, message: String| Err(Error::option(option, message));
-        if !(1..=100_000).contains(&self.frames) {
-            return wrong("--frames", format!("{} is not a number of frames from 1 to 100000", self.frames));
-        }
-        if !self.step.is_finite() {
-            return wrong("--step", format!("{} is not a finite number of degrees", self.step));
-        }
         if let Some(budget) = self.budgets.iter().find(|budget| !(0.01..=1000.0).contains(*budget)) {
             return wrong("--budgets", format!("{budget} is not a share from 0.01 to 1000 per cent"));
         }
-        if self.threads > 1024 {
-            return wrong(
-                "--threads",
-                format!("{} are too many; give at most 1024, or 0 for all", self.threads),
-            );
-        }
+        let tuning = Tuning { threads: self.threads, ..Tuning::default() };
+        tuning.check().map_err(as_option)?;
         let accuracy = self.accuracy.mode()?;
         if accuracy == Accuracy::Fast {
             return wrong(
@@ -148,29 +125,20 @@ impl Args {
             .map(|name| name.parse().map_err(|error: Error| renamed(error, "--policies")))
             .collect::<Result<_>>()?;
         let loadings =
-            self.loading.iter().map(|name| loading(name, self.loaders)).collect::<Result<Vec<_>>>()?;
+            self.loading.iter().map(|name| self.shape.loading(name)).collect::<Result<Vec<_>>>()?;
         let camera = self.camera.as_deref().map(Camera::parse).transpose()?;
         camera.as_ref().map(Camera::check).transpose()?;
         let options = Options {
             camera,
-            orbit: Orbit { frames: self.frames, step: self.step },
+            orbit: orbit("--frames", self.frames, self.step)?,
             size: self.size.parse()?,
             shadows: !self.no_shadows,
             budgets: self.budgets.iter().map(|percent| percent / 100.0).collect(),
             policies,
             loadings,
-            cache: CacheOptions {
-                block: self.block,
-                ways: self.ways,
-                stripes: self.stripes,
-                direct: self.direct,
-                ..CacheOptions::default()
-            },
+            cache: self.shape.options(),
             nodes: self.nodes,
-            threads: match self.threads {
-                0 => std::thread::available_parallelism().map_or(1, usize::from),
-                threads => threads,
-            },
+            threads: tuning.worker_count(),
             accuracy,
             isa: Isa::from_env()?,
         };

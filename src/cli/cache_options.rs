@@ -14,6 +14,19 @@ pub struct CacheArgs {
     /// Which block makes room for another: fifo, lru, frequency, decaying, clock, sieve or s3-fifo
     #[arg(long, value_name = "NAME", default_value = Replacement::default().name())]
     policy: String,
+    /// Who reads: async (threads of their own, while other tiles go on) or sync (who needs a block waits for it)
+    #[arg(long, value_name = "async|sync", default_value = "async")]
+    loading: String,
+    /// A cache of its own for nodes, as PART:POLICY: the part (0.01 to 0.99) of the memory that it has
+    #[arg(long, value_name = "PART:POLICY")]
+    nodes: Option<String>,
+    #[command(flatten)]
+    shape: ShapeArgs,
+}
+
+/// What caches are like, whatever their policy.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ShapeArgs {
     /// Bytes of a block: 4096, 8192, 16384, 32768 or 65536
     #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]
     block: usize,
@@ -23,16 +36,10 @@ pub struct CacheArgs {
     /// Locks that sets share
     #[arg(long, value_name = "N", default_value_t = CacheOptions::default().stripes)]
     stripes: usize,
-    /// Who reads: async (threads of their own, while other tiles go on) or sync (who needs a block waits for it)
-    #[arg(long, value_name = "async|sync", default_value = "async")]
-    loading: String,
     /// Threads that read, if they are threads of their own
-    #[arg(long, value_name = "N", default_value_t = 16)]
+    #[arg(long, value_name = "N", default_value_t = Loading::LOADERS)]
     loaders: usize,
-    /// A cache of its own for nodes, as PART:POLICY: the part (0.01 to 0.99) of the memory that it has
-    #[arg(long, value_name = "PART:POLICY")]
-    nodes: Option<String>,
-    /// Read past the system's own memory of the file (Linux)
+    /// Read past the system's own memory of the file, so that a read takes what the disk takes (Linux)
     #[arg(long)]
     direct: bool,
 }
@@ -44,25 +51,33 @@ impl CacheArgs {
     /// One makes no sense.
     pub fn options(&self) -> Result<CacheOptions> {
         let options = CacheOptions {
-            block: self.block,
-            ways: self.ways,
-            stripes: self.stripes,
             policy: self.policy.parse()?,
             nodes: self.nodes.as_deref().map(nodes).transpose()?,
-            loading: loading(&self.loading, self.loaders)?,
-            direct: self.direct,
+            loading: self.shape.loading(&self.loading)?,
+            ..self.shape.options()
         };
         options.check()?;
         Ok(options)
     }
 }
 
-/// `sync` or `async`.
-pub fn loading(name: &str, loaders: usize) -> Result<Loading> {
-    match name {
-        "async" => Ok(Loading::Asynchronous { loaders }),
-        "sync" => Ok(Loading::Synchronous),
-        _ => Err(Error::option("--loading", format!("\"{name}\" is neither async nor sync"))),
+impl ShapeArgs {
+    /// The options, with all else as it is by itself; not checked.
+    pub fn options(&self) -> CacheOptions {
+        let Self { block, ways, stripes, direct, .. } = *self;
+        CacheOptions { block, ways, stripes, direct, ..CacheOptions::default() }
+    }
+
+    /// `sync` or `async`.
+    ///
+    /// # Errors
+    /// It is neither.
+    pub fn loading(&self, name: &str) -> Result<Loading> {
+        match name {
+            "async" => Ok(Loading::Asynchronous { loaders: self.loaders }),
+            "sync" => Ok(Loading::Synchronous),
+            _ => Err(Error::option("--loading", format!("\"{name}\" is neither async nor sync"))),
+        }
     }
 }
 

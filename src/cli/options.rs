@@ -6,6 +6,7 @@ use crate::geometry::Accuracy;
 use crate::kdtree::{BuildParams, Preset};
 use crate::mesh::Mesh;
 use crate::profile::{self, Profile};
+use crate::scene::Orbit;
 use crate::store::is_scene;
 use std::path::Path;
 use tracing::info;
@@ -136,6 +137,24 @@ fn parse_size(text: &str) -> Result<usize> {
         Ok(size) if size >= 0.0 && size * factor < 1e18 => Ok((size * factor) as usize),
         _ => Err(Error::option("--memory", format!("\"{text}\" is no size; write 512MiB or 2GiB"))),
     }
+}
+
+/// The longest camera path.
+const MAX_FRAMES: u32 = 100_000;
+
+/// A camera path of so many frames, which `option` has given.
+///
+/// # Errors
+/// It has no frames or too many, or the step is no number.
+pub fn orbit(option: &str, frames: u32, step: f64) -> Result<Orbit> {
+    if !(1..=MAX_FRAMES).contains(&frames) {
+        let message = format!("{frames} is not a number of frames from 1 to {MAX_FRAMES}");
+        return Err(Error::option(option, message));
+    }
+    if !step.is_finite() {
+        return Err(Error::option("--step", format!("{step} is not a finite number of degrees")));
+    }
+    Ok(Orbit { frames, step })
 }
 
 /// A fault of the settings, named by the option instead of the profile's key.

@@ -5,7 +5,7 @@ mod report;
 
 use super::cache_options::{CacheArgs, CacheReport};
 use super::model::Model;
-use super::options::{AccuracyOption, BuildOptions, as_option};
+use super::options::{AccuracyOption, BuildOptions, as_option, orbit};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
@@ -30,9 +30,6 @@ const MODEL_SIZE: Size = Size { width: 1024, height: 1024 };
 
 /// The size of pictures of the demo.
 const DEMO_SIZE: Size = Size { width: 1280, height: 720 };
-
-/// The longest camera path.
-const MAX_FRAMES: u32 = 100_000;
 
 /// Render a picture, or a path of pictures, of a model
 ///
@@ -114,13 +111,12 @@ pub fn run(args: &Args) -> Result<()> {
     info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
-    let memory = args.build.limit()?;
-    let mut scene = match &args.scene {
-        Some(path) if is_scene(path) && memory.is_some() => {
-            args.open_within(path, memory.unwrap_or_default(), &settings, accuracy, isa)?
+    let mut scene = match (&args.scene, args.build.limit()?) {
+        (Some(path), Some(memory)) if is_scene(path) => {
+            args.open_within(path, memory, &settings, accuracy, isa)?
         }
-        Some(path) => Scene::prepare(path, &args.build, &profile.build, isa)?,
-        None => Model::demo().build(&args.build, &profile.build, isa)?,
+        (Some(path), _) => Scene::prepare(path, &args.build, &profile.build, isa)?,
+        (None, _) => Model::demo().build(&args.build, &profile.build, isa)?,
     };
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
@@ -189,8 +185,8 @@ impl Args {
             }
             Ok::<(), Error>(())
         })?;
-        let budget = self.build.limit()?.unwrap_or_default();
-        let cache = scene.accel.cached().map(|cached| CacheReport::new(budget, cached));
+        let cached = scene.accel.cached().zip(self.build.limit()?);
+        let cache = cached.map(|(cached, budget)| CacheReport::new(budget, cached));
         let report = Report::new(scene, renderer.settings(), self.build.name(), shots, cache);
         self.json.give(&report.text(scene), &report)
     }
@@ -226,14 +222,7 @@ impl Args {
 
     fn orbit(&self) -> Result<Option<Orbit>> {
         let Some(frames) = self.orbit else { return Ok(None) };
-        if !(1..=MAX_FRAMES).contains(&frames) {
-            let message = format!("{frames} is not a number of frames from 1 to {MAX_FRAMES}");
-            return Err(Error::option("--orbit", message));
-        }
-        if !self.step.is_finite() {
-            return Err(Error::option("--step", format!("{} is not a finite number of degrees", self.step)));
-        }
-        Ok(Some(Orbit { frames, step: self.step }))
+        orbit("--orbit", frames, self.step).map(Some)
     }
 
     fn default_camera(&self, scene: &Scene, size: Size) -> Camera {

@@ -75,6 +75,13 @@ pub fn linear_to_srgb(light: f32) -> u8 {
     (s * 255.0 + 0.5) as u8
 }
 
+/// The colour between three corners, blended in linear light as `(1 - u - v) c0 + u c1 + v c2`.
+#[inline]
+pub(crate) fn blend(corners: [[u8; 3]; 3], u: f32, v: f32) -> Vec3 {
+    let [c0, c1, c2] = corners.map(decode);
+    (1.0 - u - v) * c0 + u * c1 + v * c2
+}
+
 /// An sRGB triple in linear light.
 #[inline]
 pub(crate) fn decode(srgb: [u8; 3]) -> Vec3 {

@@ -13,8 +13,8 @@ mod read;
 mod shape;
 
 pub use check::MAX_TRIANGLES;
-pub(crate) use color::decode;
 pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
+pub(crate) use color::{blend, decode};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
 pub use shape::{DECADES, Shapes};
 
@@ -56,10 +56,7 @@ impl Mesh {
         match &self.colors {
             Colors::Uniform(color) => *color,
             Colors::PerTriangle(colors) => color::decode(colors[i]),
-            Colors::PerVertex(colors) => {
-                let [c0, c1, c2] = self.triangles[i].map(|k| color::decode(colors[k as usize]));
-                (1.0 - u - v) * c0 + u * c1 + v * c2
-            }
+            Colors::PerVertex(colors) => color::blend(self.triangles[i].map(|k| colors[k as usize]), u, v),
             Colors::PerMaterial { materials, of_triangle } => materials[of_triangle[i] as usize].diffuse,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::cache::{Cached, View};
 use crate::kdtree::Tree;
-use crate::mesh::{Mesh, decode};
+use crate::mesh::{Mesh, blend, decode};
 use crate::store::{self, ColorMeta, Stored};
 use glam::Vec3;
 use std::sync::Arc;
@@ -59,9 +59,7 @@ impl CachedSurface {
         };
         Self { cached, paint }
     }
-}
 
-impl CachedSurface {
     #[inline]
     fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
         view.enter_triangle(primitive);
@@ -78,8 +76,7 @@ impl CachedSurface {
             CachedPaint::PerTriangle => decode(view.color_bytes::<3>(at(3))),
             CachedPaint::PerCorner => {
                 let [a, b, c, d, e, f, g, h, i] = view.color_bytes::<9>(at(9));
-                let [c0, c1, c2] = [[a, b, c], [d, e, f], [g, h, i]].map(decode);
-                (1.0 - u - v) * c0 + u * c1 + v * c2
+                blend([[a, b, c], [d, e, f], [g, h, i]], u, v)
             }
             CachedPaint::PerMaterial(diffuse) => {
                 diffuse[material_in(view, primitive) as usize % diffuse.len()]

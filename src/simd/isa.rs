@@ -127,7 +127,7 @@ impl Chosen {
     #[inline]
     pub fn run<T: Task>(self, task: T) -> T::Output {
         match self.0 {
-            Isa::Portable => task.run::<Portable>(),
+            Isa::Portable => run_portable(task),
             // SAFETY: a `Chosen` exists only for an instruction set that the machine has.
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => unsafe { run_avx2(task) },
@@ -144,6 +144,12 @@ impl fmt::Debug for Chosen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
     }
+}
+
+/// Out of line as the others are: callers would all compile it anew.
+#[inline(never)]
+fn run_portable<T: Task>(task: T) -> T::Output {
+    task.run::<Portable>()
 }
 
 #[cfg(target_arch = "x86_64")]

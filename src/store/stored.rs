@@ -6,7 +6,7 @@ use super::section::Kind;
 use crate::column::Column;
 use crate::error::Result;
 use crate::geometry::triangle::Triangle;
-use crate::mesh::decode;
+use crate::mesh::{blend, decode};
 use glam::Vec3;
 
 /// The surfaces of a stored scene: where a triangle's corners are, and what colour it has. Nothing is copied.
@@ -118,10 +118,7 @@ impl Paint {
         match self {
             Self::Uniform(color) => *color,
             Self::PerTriangle(colors) => decode(colors[i]),
-            Self::PerCorner(colors) => {
-                let [c0, c1, c2] = colors[i].map(decode);
-                (1.0 - u - v) * c0 + u * c1 + v * c2
-            }
+            Self::PerCorner(colors) => blend(colors[i], u, v),
             Self::PerMaterial { diffuse, of_triangle } => diffuse[of_triangle[i] as usize],
         }
     }

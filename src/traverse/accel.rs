@@ -1,10 +1,11 @@
 //! A mesh made ready for tracing, and the calls that trace.
 
 use super::kernel::Kernel;
-use super::lanes::{HitPacket, PacketWidth, RayPacket};
-use super::query::{CountTile, InMode, IntersectPacket, IntersectTile, OccludedPacket, OccludedTile, Query};
+use super::lanes::{HitPacket, RayPacket};
+use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query};
 use super::records::Resident;
 use super::tile::{PACKETS, TileCounts};
+use super::width::PacketWidth;
 use crate::cache::Cached;
 use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
@@ -144,7 +145,7 @@ impl Accel {
 
     /// Has a kernel called in the chosen mode, on the chosen instruction set.
     #[inline(always)]
-    fn ask<Q: Query>(&self, query: Q) -> Q::Output {
+    pub(super) fn ask<Q: Query>(&self, query: Q) -> Q::Output {
         let tree = match &self.storage {
             Storage::Resident(tree) => &**tree,
             Storage::Cached(cached) => return self.ask_cached(cached, query),
@@ -186,7 +187,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        self.ask(IntersectPacket { rays, active: active & lanes_of(W) })
+        rays.intersect(self, active & lanes_of(W))
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies.
@@ -195,7 +196,7 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        self.ask(OccludedPacket { rays, active: active & lanes_of(W) })
+        rays.occluded(self, active & lanes_of(W))
     }
 
     /// [`intersect_packet`](Self::intersect_packet) in two packets of 8: quicker where rays part.

@@ -1,7 +1,6 @@
 //! Rays and hits component by component, as the packet kernels take and give them.
 
 use crate::geometry::{Hit, NO_PRIMITIVE, Ray};
-use crate::simd::{Lanes, Simd};
 use glam::Vec3;
 
 /// `W` rays, component by component. `W` is 1, 4, 8 or 16.
@@ -129,27 +128,4 @@ impl HitPacket<1> {
         let normal = normal.to_array().map(|coordinate| [coordinate]);
         Self { t: [t], u: [u], v: [v], primitive: [primitive], normal }
     }
-}
-
-/// The widths that there are kernels for, and the vectors that they use: implemented for
-/// `RayPacket<1>`, `<4>`, `<8>` and `<16>`.
-pub trait PacketWidth<const W: usize> {
-    /// `W` floats in an instruction set.
-    type Lanes<S: Simd>: Lanes<W>;
-}
-
-impl PacketWidth<1> for RayPacket<1> {
-    type Lanes<S: Simd> = f32;
-}
-
-impl PacketWidth<4> for RayPacket<4> {
-    type Lanes<S: Simd> = S::F4;
-}
-
-impl PacketWidth<8> for RayPacket<8> {
-    type Lanes<S: Simd> = S::F8;
-}
-
-impl PacketWidth<16> for RayPacket<16> {
-    type Lanes<S: Simd> = S::F16;
 }

@@ -23,13 +23,15 @@ mod stopwatch;
 mod stream;
 mod tile;
 mod walk;
+mod width;
 
 pub use accel::Accel;
 pub use dispatch::{Dispatch, DispatchPool};
 pub use kernel::Kernel;
-pub use lanes::{HitPacket, PacketWidth, RayPacket};
+pub use lanes::{HitPacket, RayPacket};
 pub use stopwatch::Stopwatch;
 pub use tile::TileCounts;
+pub use width::PacketWidth;
 
 #[cfg(test)]
 mod tests;

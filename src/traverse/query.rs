@@ -1,9 +1,10 @@
 //! What is asked of a tree, in whichever mode and on whichever instruction set was chosen.
 
-use super::lanes::{HitPacket, PacketWidth, RayPacket};
+use super::lanes::{HitPacket, RayPacket};
 use super::packet;
 use super::records::Records;
 use super::tile::{self, PACKETS, TileCounts};
+use super::width::PacketWidth;
 use crate::geometry::triangle::Mode;
 use crate::simd::{Simd, Task};
 use std::marker::PhantomData;
