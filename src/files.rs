@@ -13,18 +13,27 @@ use tempfile::NamedTempFile;
 /// # Errors
 /// [`Error::Write`].
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
-    let write = || {
-        let temporary = beside(path)?;
-        // The file itself: tempfile would put its own path into every error.
-        let mut out = BufWriter::with_capacity(1 << 18, temporary.as_file().try_clone()?);
-        fill(&mut out)?;
-        // Some file systems find no room only now; and a name must not outlive a power cut that its
-        // bytes did not.
-        out.into_inner()?.sync_data()?;
-        temporary.persist(path)?;
-        Ok(())
-    };
-    write().map_err(|source| Error::Write { path: path.into(), source })
+    let cannot = |source| Error::Write { path: path.into(), source };
+    write_or(path, |out| fill(out).map_err(cannot))
+}
+
+/// The same where `fill` fails of its own: with an error that is passed on, and nothing is written.
+///
+/// # Errors
+/// [`Error::Write`], or what `fill` fails with.
+pub fn write_or<T>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<T>) -> Result<T> {
+    let cannot = |source| Error::Write { path: path.into(), source };
+    let temporary = beside(path).map_err(cannot)?;
+    // The file itself: tempfile would put its own path into every error.
+    let file = temporary.as_file().try_clone().map_err(cannot)?;
+    let mut out = BufWriter::with_capacity(1 << 18, file);
+    let result = fill(&mut out)?;
+    // Some file systems find no room only now; and a name must not outlive a power cut that its
+    // bytes did not.
+    let file = out.into_inner().map_err(|error| cannot(error.into_error()))?;
+    file.sync_data().map_err(cannot)?;
+    temporary.persist(path).map_err(|error| cannot(error.error))?;
+    Ok(result)
 }
 
 /// Finds out, before any long work, whether [`write_whole`] can create `path`. Leaves no trace.
@@ -67,6 +76,57 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
         ),
         kind => kind.into(),
     })
+}
+
+/// Fills `into` with a file's bytes from an offset on. The file's own position means nothing, and on Windows
+/// moves.
+///
+/// # Errors
+/// The file cannot be read, or ends before.
+#[cfg(unix)]
+pub fn read_at(file: &File, into: &mut [u8], offset: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, into, offset)
+}
+
+/// Fills `into` with a file's bytes from an offset on. The file's own position means nothing, and moves.
+///
+/// # Errors
+/// The file cannot be read, or ends before.
+#[cfg(windows)]
+pub fn read_at(file: &File, mut into: &mut [u8], mut offset: u64) -> io::Result<()> {
+    use std::os::windows::fs::FileExt;
+    while !into.is_empty() {
+        match file.seek_read(into, offset)? {
+            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            read => (into, offset) = (&mut into[read..], offset + read as u64),
+        }
+    }
+    Ok(())
+}
+
+/// Writes bytes to a file from an offset on; otherwise as [`read_at`].
+///
+/// # Errors
+/// The file cannot be written.
+#[cfg(unix)]
+pub fn write_at(file: &File, bytes: &[u8], offset: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, offset)
+}
+
+/// Writes bytes to a file from an offset on; otherwise as [`read_at`].
+///
+/// # Errors
+/// The file cannot be written.
+#[cfg(windows)]
+pub fn write_at(file: &File, mut bytes: &[u8], mut offset: u64) -> io::Result<()> {
+    use std::os::windows::fs::FileExt;
+    while !bytes.is_empty() {
+        match file.seek_write(bytes, offset)? {
+            0 => return Err(ErrorKind::WriteZero.into()),
+            written => (bytes, offset) = (&bytes[written..], offset + written as u64),
+        }
+    }
+    Ok(())
 }
 
 /// The same as [`write_whole`] for text.

@@ -72,6 +72,7 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod simd;
+pub mod spool;
 pub mod store;
 pub mod study;
 pub mod traverse;

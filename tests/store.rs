@@ -228,3 +228,42 @@ fn build_refuses_before_it_works() {
     place.fail("build nowhere.ply -o scene.rpk", &["cannot read nowhere.ply"]);
     assert!(place.read("scene.rpk") == before, "what was there stays");
 }
+
+#[test]
+fn models_larger_than_the_memory_given_are_built_piece_by_piece() {
+    let place = Place::new();
+    place.succeed("generate plant --triangles 400k --seed 5 -o plant.ply");
+    place.succeed("build plant.ply -o whole.rpk");
+    let build = "build plant.ply -o parts.rpk --memory 120MiB";
+    let text = place.succeed(build);
+    assert!(text.contains(" parts; the builder held ") && text.contains("of 120 MiB given"), "{text}");
+    let built = report(&place, build);
+    assert!(built["parts"].as_u64().expect("a number") >= 4, "{built}");
+    let memory = &built["build_memory"];
+    assert_eq!(memory["announced"], 120 << 20);
+    if cfg!(target_os = "linux") {
+        assert!(memory["resident"].as_u64().expect("the system says") <= 120 << 20, "{memory}");
+    }
+    place.succeed("info parts.rpk --verify");
+    let bytes = |file: &str| {
+        let info = report(&place, &format!("info {file}"));
+        let (file, sections) = (place.read(file), info["file"]["sections"].clone());
+        let mut arrays: Vec<(String, Vec<u8>)> = Vec::new();
+        for section in sections.as_array().expect("a list") {
+            let number = |key: &str| section[key].as_u64().expect("a number") as usize;
+            let kind = section["kind"].as_str().expect("a name").to_owned();
+            if kind != "meta" {
+                arrays.push((kind, file[number("offset")..][..number("bytes")].to_vec()));
+            }
+        }
+        arrays.sort();
+        arrays
+    };
+    for ((kind, whole), (other, parts)) in bytes("whole.rpk").into_iter().zip(bytes("parts.rpk")) {
+        assert!(kind == other && whole == parts, "{kind}, {other}");
+    }
+    let files = place.files();
+    assert_eq!(files, ["parts.rpk", "plant.ply", "whole.rpk"], "nothing else is left");
+    let refused = ["--memory: building ", "triangles piece by piece takes", "MiB: give "];
+    place.fail("build plant.ply -o parts.rpk --memory 60MiB", &refused);
+}

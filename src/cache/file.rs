@@ -6,6 +6,7 @@ use super::plan::CacheOptions;
 use super::source::Source;
 use super::{Cached, Resident};
 use crate::error::{Error, Result};
+use crate::files::read_at;
 use crate::store::{self, Kind, block_checksum};
 use std::fs;
 use std::io;
@@ -120,23 +121,6 @@ fn open(path: &Path, direct: bool) -> io::Result<fs::File> {
         ));
     }
     options.open(path)
-}
-
-#[cfg(unix)]
-fn read_at(file: &fs::File, into: &mut [u8], offset: u64) -> io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, into, offset)
-}
-
-#[cfg(windows)]
-fn read_at(file: &fs::File, mut into: &mut [u8], mut offset: u64) -> io::Result<()> {
-    use std::os::windows::fs::FileExt;
-    while !into.is_empty() {
-        match file.seek_read(into, offset)? {
-            0 => return Err(io::ErrorKind::UnexpectedEof.into()),
-            read => (into, offset) = (&mut into[read..], offset + read as u64),
-        }
-    }
-    Ok(())
 }
 
 impl Cached {

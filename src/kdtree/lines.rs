@@ -113,10 +113,7 @@ pub struct Lines(Column<Line>);
 impl Lines {
     /// Packs a tree whose references are [`counted`].
     pub fn pack(nodes: &[Node], bounds: &Aabb) -> Self {
-        let empty = Line { planes: [f32::INFINITY; 8], exits: [0; 8] };
-        let mut lines = vec![empty; count(nodes, nodes[0])];
-        Treelets { nodes }.fill(&mut lines, 0, nodes[0], bounds, 0);
-        Self(lines.into())
+        Self(pack(nodes, nodes[0], bounds).into())
     }
 
     /// Lines that were packed before.
@@ -134,6 +131,13 @@ impl Lines {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.0[..])
     }
+}
+
+/// The lines of a subtree that begins with a line of its own, numbered from 0.
+pub fn pack(nodes: &[Node], root: Node, cell: &Aabb) -> Vec<Line> {
+    let mut lines = vec![Line::NOTHING; count(nodes, root)];
+    Treelets { nodes }.fill(&mut lines, 0, root, cell, 0);
+    lines
 }
 
 /// How many lines a subtree takes.
@@ -193,12 +197,28 @@ impl Treelets<'_> {
 }
 
 /// An exit that goes on: its place, the node there, and its cell.
-type Below = (usize, Node, Aabb);
+pub type Below = (usize, Node, Aabb);
 
 impl Line {
+    /// A line in which nothing is.
+    pub const NOTHING: Self = Self { planes: [f32::INFINITY; 8], exits: [0; 8] };
+
+    /// The same line in a longer array: lines `lines` further on, and records `words`.
+    pub fn moved(mut self, lines: usize, words: usize) -> Self {
+        for exit in &mut self.exits {
+            let (to, axis) = (Exit(*exit), *exit & 3);
+            if to.is_leaf() {
+                *exit = Exit::of_leaf(to.record() + words).0 | axis;
+            } else if to.line() != 0 {
+                *exit = Exit::of_line(to.line() + lines).0 | axis;
+            }
+        }
+        self
+    }
+
     /// The treelet under `root`, and its exits that go on, larger ones first, whose lines are not filled in.
-    fn of_treelet(nodes: &[Node], root: Node, cell: &Aabb) -> (Self, Vec<Below>) {
-        let mut line = Self { planes: [f32::INFINITY; 8], exits: [0; 8] };
+    pub fn of_treelet(nodes: &[Node], root: Node, cell: &Aabb) -> (Self, Vec<Below>) {
+        let mut line = Self::NOTHING;
         // The treelet's nodes and then its exits, breadth first; there is nothing above a plane at infinity.
         let mut found: [Option<(Node, Aabb)>; 15] = [None; 15];
         found[0] = Some((root, *cell));
@@ -233,20 +253,25 @@ impl Line {
     }
 }
 
-/// The references with a word in front of each leaf's, which tells how many there are, and [`AFTER`] words
-/// behind the last; the nodes' leaves are moved accordingly.
+/// The references with a word in front of each leaf's, which tells how many there are; the nodes' leaves are
+/// moved accordingly. Records are in the order of a depth-first walk, as the references are.
 pub fn counted(nodes: &mut [Node], references: &[u32]) -> Vec<u32> {
     let leaves = nodes.iter().filter(|node| node.is_leaf() && !node.references().is_empty()).count();
     let mut all = Vec::with_capacity(references.len() + leaves + AFTER);
-    for node in nodes {
-        if node.is_leaf() && !node.references().is_empty() {
-            let range = node.references();
+    let mut stack = vec![0];
+    while let Some(index) = stack.pop() {
+        let node = nodes[index];
+        let range = node.references();
+        if !node.is_leaf() {
+            stack.extend([node.below() as usize + 1, node.below() as usize]);
+        } else if range.is_empty() {
+            nodes[index] = Node::leaf(0, 0);
+        } else {
             all.push(range.len() as u32);
-            *node = Node::leaf(all.len(), range.len());
+            nodes[index] = Node::leaf(all.len(), range.len());
             all.extend_from_slice(&references[range]);
         }
     }
-    all.extend([0; AFTER]);
     all
 }
 

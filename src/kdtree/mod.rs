@@ -7,6 +7,7 @@ mod build;
 mod lines;
 mod memory;
 mod node;
+pub mod outer;
 mod pages;
 mod params;
 mod parts;
@@ -116,7 +117,8 @@ impl KdTree {
             build::build(&triangles, bounds, params, &ledger, progress)?;
         let pages = pages::Pages::cut(&nodes, &references, params.page);
         ledger.add(pages.bytes());
-        let counted = lines::counted(&mut nodes, &references);
+        let mut counted = lines::counted(&mut nodes, &references);
+        counted.extend([0; lines::AFTER]);
         ledger.add(bytes_of(&counted));
         ledger.sub(bytes_of(&references));
         drop(references);

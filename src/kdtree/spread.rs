@@ -13,24 +13,28 @@ impl KdTree {
     /// its triangles lie in together, if arrays begin at the start of a block.
     pub fn spread(&self) -> [usize; SPREAD_BLOCKS.len()] {
         let arrays = self.arrays();
-        let leaves = |nodes: &'_ [Node], lists: &'_ [u32]| {
-            let leaves = nodes.par_iter().filter(|node| node.is_leaf() && !node.references().is_empty());
-            let spread = leaves.map_init(Vec::new, |blocks, leaf| {
-                let list = leaf.references();
-                let triangles = of_list(&lists[list.clone()], blocks);
-                let words = list_blocks(list);
-                std::array::from_fn(|i| triangles[i] + words[i])
-            });
-            spread.reduce(|| [0; SPREAD_BLOCKS.len()], greatest)
-        };
-        greatest(leaves(arrays.nodes, arrays.references), leaves(arrays.upper, arrays.pages))
+        greatest(of_leaves(arrays.nodes, arrays.references, 0), of_leaves(arrays.upper, arrays.pages, 0))
     }
 }
 
 /// Blocks, for each size.
-type Spread = [usize; SPREAD_BLOCKS.len()];
+pub(super) type Spread = [usize; SPREAD_BLOCKS.len()];
 
-fn greatest(a: Spread, b: Spread) -> Spread {
+/// The most blocks of a leaf's list and its triangles, where the lists are words of a longer array, from its
+/// word `first` on.
+pub(super) fn of_leaves(nodes: &[Node], lists: &[u32], first: usize) -> Spread {
+    let leaves = nodes.par_iter().filter(|node| node.is_leaf() && !node.references().is_empty());
+    let spread = leaves.map_init(Vec::new, |blocks, leaf| {
+        let list = leaf.references();
+        let triangles = of_list(&lists[list.clone()], blocks);
+        let words = list_blocks(first + list.start..first + list.end);
+        std::array::from_fn(|i| triangles[i] + words[i])
+    });
+    spread.reduce(|| [0; SPREAD_BLOCKS.len()], greatest)
+}
+
+/// The greater of each.
+pub(super) fn greatest(a: Spread, b: Spread) -> Spread {
     std::array::from_fn(|i| a[i].max(b[i]))
 }
 

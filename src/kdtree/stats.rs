@@ -1,8 +1,7 @@
 //! Figures about a tree.
 
-use super::{KdTree, Node, Tree};
+use super::{BuildParams, KdTree, Node, Tree};
 use crate::geometry::Aabb;
-use crate::geometry::triangle::Triangle;
 use serde::{Deserialize, Serialize};
 
 /// What a tree looks like and what a ray is expected to pay in it.
@@ -75,55 +74,17 @@ impl KdTree {
 
     /// Walks the whole tree and counts.
     fn count(&self) -> TreeStats {
-        let mut stats = TreeStats {
-            triangles: self.triangles.len(),
-            leaf_histogram: vec![0; HISTOGRAM + 1],
-            node_bytes: self.nodes.len() * size_of::<Node>(),
-            reference_bytes: self.references.len() * size_of::<u32>(),
-            triangle_bytes: self.triangles.len() * size_of::<Triangle>(),
-            page_bytes: self.pages.bytes(),
-            line_bytes: self.lines.bytes(),
-            pages: self.pages.upper.iter().filter(|n| n.is_leaf() && !n.references().is_empty()).count(),
-            ..TreeStats::default()
+        let mut tally = Tally::new(&self.bounds);
+        tally.subtree(&self.nodes, self.root(), self.bounds, 0);
+        tally.pages(&self.pages.upper);
+        let bytes = Bytes {
+            nodes: size_of_val(&self.nodes[..]),
+            references: size_of_val(&self.references[..]),
+            triangles: size_of_val(&self.triangles[..]),
+            pages: self.pages.bytes(),
+            lines: self.lines.bytes(),
         };
-        let root_area = self.bounds.area();
-        let probability = |cell: &Aabb| if root_area > 0.0 { cell.area() / root_area } else { 1.0 };
-
-        let mut stack = vec![(self.root(), self.bounds, 0)];
-        while let Some((node, cell, depth)) = stack.pop() {
-            stats.nodes += 1;
-            stats.depth = stats.depth.max(depth);
-            if node.is_leaf() {
-                let count = self.primitives(node).len();
-                if stats.depth_histogram.len() <= depth {
-                    stats.depth_histogram.resize(depth + 1, 0);
-                }
-                stats.depth_histogram[depth] += 1;
-                stats.leaves += 1;
-                stats.empty_leaves += usize::from(count == 0);
-                stats.references += count;
-                stats.largest_leaf = stats.largest_leaf.max(count);
-                stats.leaf_histogram[count.min(HISTOGRAM)] += 1;
-                stats.expected_leaves += probability(&cell);
-                stats.expected_tests += probability(&cell) * count as f64;
-            } else {
-                stats.expected_steps += probability(&cell);
-                let [below, above] = self.children(node);
-                let [low, high] = cell.halves(node.axis(), node.split());
-                stack.push((above, high, depth + 1));
-                stack.push((below, low, depth + 1));
-            }
-        }
-
-        let triangles = stats.triangles.max(1) as f64;
-        stats.references_per_triangle = stats.references as f64 / triangles;
-        stats.triangles_per_leaf =
-            stats.references as f64 / (stats.leaves - stats.empty_leaves).max(1) as f64;
-        stats.triangles_per_page = self.pages.primitives.len() as f64 / stats.pages.max(1) as f64;
-        stats.sah_cost = f64::from(self.params.traversal_cost) * stats.expected_steps
-            + f64::from(self.params.intersection_cost) * stats.expected_tests;
-        stats.bytes_per_triangle = stats.bytes() as f64 / triangles;
-        stats
+        tally.stats(self.triangles.len(), &self.params, &bytes)
     }
 
     /// How often perfect splits cut triangles: entry `i` counts those in `i + 1` leaves, the last one also
@@ -142,5 +103,102 @@ impl KdTree {
             histogram[(count as usize).min(HISTOGRAM) - 1] += 1;
         }
         histogram
+    }
+}
+
+/// What a tree takes.
+pub(super) struct Bytes {
+    pub nodes: usize,
+    pub references: usize,
+    pub triangles: usize,
+    pub pages: usize,
+    pub lines: usize,
+}
+
+/// [`TreeStats`] in the making, subtree by subtree.
+pub(super) struct Tally {
+    root_area: f64,
+    stats: TreeStats,
+    page_primitives: usize,
+}
+
+impl Tally {
+    /// Nothing counted, of a tree with these bounds.
+    pub fn new(bounds: &Aabb) -> Self {
+        let stats = TreeStats { leaf_histogram: vec![0; HISTOGRAM + 1], ..TreeStats::default() };
+        Self { root_area: bounds.area(), stats, page_primitives: 0 }
+    }
+
+    /// Counts a subtree whose root lies in `cell`, below `depth` inner nodes.
+    pub fn subtree(&mut self, nodes: &[Node], root: Node, cell: Aabb, depth: usize) {
+        let mut stack = vec![(root, cell, depth)];
+        while let Some((node, cell, depth)) = stack.pop() {
+            if node.is_leaf() {
+                self.leaf(node.references().len(), &cell, depth);
+            } else {
+                self.inner(&cell, depth);
+                let below = node.below() as usize;
+                let [low, high] = cell.halves(node.axis(), node.split());
+                stack.push((nodes[below + 1], high, depth + 1));
+                stack.push((nodes[below], low, depth + 1));
+            }
+        }
+    }
+
+    /// Counts an inner node.
+    pub fn inner(&mut self, cell: &Aabb, depth: usize) {
+        self.stats.nodes += 1;
+        self.stats.depth = self.stats.depth.max(depth);
+        self.stats.expected_steps += self.probability(cell);
+    }
+
+    fn leaf(&mut self, count: usize, cell: &Aabb, depth: usize) {
+        let probability = self.probability(cell);
+        let stats = &mut self.stats;
+        if stats.depth_histogram.len() <= depth {
+            stats.depth_histogram.resize(depth + 1, 0);
+        }
+        stats.nodes += 1;
+        stats.depth = stats.depth.max(depth);
+        stats.depth_histogram[depth] += 1;
+        stats.leaves += 1;
+        stats.empty_leaves += usize::from(count == 0);
+        stats.references += count;
+        stats.largest_leaf = stats.largest_leaf.max(count);
+        stats.leaf_histogram[count.min(HISTOGRAM)] += 1;
+        stats.expected_leaves += probability;
+        stats.expected_tests += probability * count as f64;
+    }
+
+    /// Counts the pages among the nodes of an upper tree.
+    pub fn pages(&mut self, upper: &[Node]) {
+        for page in upper.iter().filter(|node| node.is_leaf() && !node.references().is_empty()) {
+            self.stats.pages += 1;
+            self.page_primitives += page.references().len();
+        }
+    }
+
+    /// How likely a ray that meets the bounds meets a cell.
+    fn probability(&self, cell: &Aabb) -> f64 {
+        if self.root_area > 0.0 { cell.area() / self.root_area } else { 1.0 }
+    }
+
+    /// What has been counted.
+    pub fn stats(self, triangles: usize, params: &BuildParams, bytes: &Bytes) -> TreeStats {
+        let Self { mut stats, page_primitives, .. } = self;
+        stats.triangles = triangles;
+        stats.node_bytes = bytes.nodes;
+        stats.reference_bytes = bytes.references;
+        stats.triangle_bytes = bytes.triangles;
+        stats.page_bytes = bytes.pages;
+        stats.line_bytes = bytes.lines;
+        stats.references_per_triangle = stats.references as f64 / triangles as f64;
+        stats.triangles_per_leaf =
+            stats.references as f64 / (stats.leaves - stats.empty_leaves).max(1) as f64;
+        stats.triangles_per_page = page_primitives as f64 / stats.pages.max(1) as f64;
+        stats.sah_cost = f64::from(params.traversal_cost) * stats.expected_steps
+            + f64::from(params.intersection_cost) * stats.expected_tests;
+        stats.bytes_per_triangle = stats.bytes() as f64 / triangles as f64;
+        stats
     }
 }

@@ -96,7 +96,12 @@ pub(super) fn encode(linear: Vec3) -> [u8; 3] {
 /// sRGB-encoded floats as bytes. They run from 0 to 1, but some tools write 0 to 255 all the
 /// same: so one value above 1 says that all of them are meant so.
 pub(super) fn quantize(colors: &[[f32; 3]]) -> Vec<[u8; 3]> {
-    let scale = if colors.iter().flatten().any(|&c| c > 1.0) { 1.0 } else { 255.0 };
+    quantize_to(colors.iter().flatten().copied().fold(0.0, f32::max), colors)
+}
+
+/// The same for some of a list's colours, of which the greatest value of all is known.
+pub(super) fn quantize_to(greatest: f32, colors: &[[f32; 3]]) -> Vec<[u8; 3]> {
+    let scale = if greatest > 1.0 { 1.0 } else { 255.0 };
     colors.iter().map(|c| c.map(|c| (c * scale + 0.5) as u8)).collect()
 }
 

@@ -7,10 +7,12 @@ mod check;
 mod color;
 pub mod generate;
 mod join;
+mod lists;
 pub mod obj;
 pub mod ply;
 mod read;
 mod shape;
+pub mod spooled;
 
 pub use check::MAX_TRIANGLES;
 pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};

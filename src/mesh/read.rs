@@ -153,32 +153,38 @@ fn parse_with(parser: Parser, bytes: &[u8], path: &Path, progress: &dyn Fn(f32))
     let mut report = ReadReport::default();
     let raw = parser(bytes, path, &mut report, progress).map_err(malformed)?;
     let (vertices, faces) = (raw.positions.len(), raw.triangles.len());
-    let mesh = check::check(raw, &mut report).map_err(|unusable| {
-        malformed(match unusable {
-            Unusable::NoTriangles if faces == 0 => {
+    let mesh =
+        check::check(raw, &mut report).map_err(|unusable| malformed(unusable.message(vertices, faces)))?;
+    progress(1.0);
+    Ok(Loaded { mesh, report })
+}
+
+impl Unusable {
+    /// What is wrong with a file of so many vertices and triangles.
+    pub(super) fn message(&self, vertices: usize, faces: usize) -> String {
+        match self {
+            Self::NoTriangles if faces == 0 => {
                 format!("no triangles ({vertices} vertices); a model needs faces, not points or lines alone")
             }
-            Unusable::NoTriangles => {
+            Self::NoTriangles => {
                 format!("no triangles: all {faces} name a vertex twice")
             }
-            Unusable::TooManyTriangles(n) => {
+            Self::TooManyTriangles(n) => {
                 format!("{n} triangles, at most {MAX_TRIANGLES} are possible; split the model")
             }
-            Unusable::NonFinite(bad) => format!(
+            Self::NonFinite(bad) => format!(
                 "{} {} that triangles use {} NaN or infinite, the first is vertex {} (counted from 0); repair the model",
                 bad.count,
                 plural("vertex", bad.count),
                 if bad.count == 1 { "is" } else { "are" },
                 bad.first,
             ),
-        })
-    })?;
-    progress(1.0);
-    Ok(Loaded { mesh, report })
+        }
+    }
 }
 
 /// The file's bytes, mapped.
-fn map(path: &Path) -> std::io::Result<Mmap> {
+pub(super) fn map(path: &Path) -> std::io::Result<Mmap> {
     let file = File::open(path)?;
     if file.metadata()?.is_dir() {
         return Err(std::io::ErrorKind::IsADirectory.into());

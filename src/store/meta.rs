@@ -2,8 +2,11 @@
 
 use crate::geometry::Aabb;
 use crate::kdtree::{BuildParams, KdTree, SPREAD_BLOCKS, Scale, Tree, TreeStats};
-use crate::mesh::{Colors, Mesh};
+use crate::mesh::{Colors, Material, Mesh};
 use serde::{Deserialize, Serialize};
+
+/// What writes files.
+pub(super) const ENGINE: &str = concat!("raypack ", env!("CARGO_PKG_VERSION"));
 
 /// What a scene file says about itself, beside its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,7 +77,7 @@ impl Meta {
         let Aabb { min, max } = tree.bounds();
         let pages = tree.arrays().upper.iter().filter(|node| node.is_leaf());
         Self {
-            engine: concat!("raypack ", env!("CARGO_PKG_VERSION")).into(),
+            engine: ENGINE.into(),
             source: source.into(),
             triangles: mesh.triangles.len() as u64,
             vertices: mesh.positions.len() as u64,
@@ -133,12 +136,14 @@ impl ColorMeta {
             Colors::PerTriangle(_) => Self::PerTriangle,
             Colors::PerVertex(_) => Self::PerVertex,
             Colors::PerMaterial { materials, .. } => {
-                let material = |material: &crate::mesh::Material| MaterialMeta {
-                    name: material.name.clone(),
-                    diffuse: material.diffuse.to_array(),
-                };
-                Self::PerMaterial { materials: materials.iter().map(material).collect() }
+                Self::PerMaterial { materials: materials.iter().map(MaterialMeta::of).collect() }
             }
         }
+    }
+}
+
+impl MaterialMeta {
+    pub(super) fn of(material: &Material) -> Self {
+        Self { name: material.name.clone(), diffuse: material.diffuse.to_array() }
     }
 }

@@ -11,17 +11,19 @@
 //! | `section` | the section table: which arrays lie where |
 //! | `checksum` | blocks and their checksums |
 //! | `meta` | what is known about the scene, as JSON |
-//! | `layout` | where a writer puts everything |
+//! | `out` | sections to a file, one after the other |
 //! | `writer` | a scene to a file |
+//! | `large/` | a scene that memory does not hold to a file |
 //! | `reader` | a file, mapped |
 //! | `load` | a file's arrays as tree and mesh |
 //! | `stored` | a file's surfaces, for shading |
 
 mod checksum;
 mod header;
-mod layout;
+pub mod large;
 mod load;
 mod meta;
+mod out;
 mod reader;
 mod section;
 mod stored;

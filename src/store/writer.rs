@@ -1,7 +1,7 @@
 //! A scene to a file.
 
-use super::layout::Layout;
 use super::meta::Meta;
+use super::out::{Out, length};
 use super::section::{Kind, Section};
 use crate::error::{Error, Result};
 use crate::files::write_whole;
@@ -11,7 +11,7 @@ use crate::mesh::{Colors, Mesh};
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 /// What was written.
@@ -63,10 +63,27 @@ pub fn write(
             sections.push((Kind::MaterialOfTriangle, bytemuck::cast_slice(of_triangle)));
         }
     }
-    let layout = Layout::new(&sections);
-    write_whole(path, |out| fill(out, &layout, progress))?;
-    let sections = layout.sections.iter().map(|(section, _)| *section).collect();
-    Ok(Written { bytes: layout.bytes(), sections })
+    let total = length(sections.iter().map(|(_, bytes)| bytes.len())) as f64;
+    let part = |written: u64| progress(written as f64 / total);
+    let mut written = None;
+    write_whole(path, |out| {
+        written = Some(fill(out, &sections, &part)?);
+        Ok(())
+    })?;
+    Ok(written.expect("it was written"))
+}
+
+/// Writes a file of these sections; `progress` is told now and then how many bytes are written.
+pub(super) fn fill(
+    file: impl Write + Seek,
+    sections: &[(Kind, &[u8])],
+    progress: &dyn Fn(u64),
+) -> io::Result<Written> {
+    let mut out = Out::new(file, progress)?;
+    for (kind, bytes) in sections {
+        out.section(*kind, bytes)?;
+    }
+    out.finish()
 }
 
 /// Whether mesh and tree make one scene.
@@ -100,28 +117,4 @@ fn check(mesh: &Mesh, tree: &KdTree) -> Result<()> {
 fn corner_colors(mesh: &Mesh) -> Vec<[[u8; 3]; 3]> {
     let Colors::PerVertex(colors) = &mesh.colors else { return Vec::new() };
     mesh.triangles.par_iter().map(|corners| corners.map(|vertex| colors[vertex as usize])).collect()
-}
-
-/// Bytes between two reports of progress.
-const STEP: usize = 4 << 20;
-
-/// Writes a file as it was laid out.
-pub(super) fn fill(out: &mut impl Write, layout: &Layout<'_>, progress: &dyn Fn(f64)) -> io::Result<()> {
-    let mut written = 0;
-    let mut put = |bytes: &[u8]| {
-        for piece in bytes.chunks(STEP) {
-            out.write_all(piece)?;
-            written += piece.len() as u64;
-            progress(written as f64 / layout.bytes() as f64);
-        }
-        Ok::<u64, io::Error>(written)
-    };
-    let mut at = put(&layout.first)?;
-    for (section, bytes) in &layout.sections {
-        put(&vec![0; (section.offset - at) as usize])?;
-        at = put(bytes)?;
-    }
-    put(&vec![0; (layout.table - at) as usize])?;
-    put(bytemuck::cast_slice(&layout.checksums))?;
-    Ok(())
 }

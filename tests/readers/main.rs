@@ -3,7 +3,7 @@
 mod obj;
 mod ply;
 
-use raypack::mesh::{self, Loaded};
+use raypack::mesh::{self, Loaded, ReadReport, spooled};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -24,10 +24,22 @@ impl Folder {
     }
 }
 
+/// Reads a file; a PLY file to files as well, and sees to it that they hold the same.
 #[track_caller]
 fn read(name: &str, content: impl AsRef<[u8]>) -> Loaded {
     let folder = Folder::new();
-    mesh::read(folder.put(name, content)).unwrap_or_else(|e| panic!("{e}"))
+    let path = folder.put(name, content);
+    let loaded = mesh::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    if name.ends_with(".ply") {
+        let (spooled, report) = spooled::read(&path, folder.0.path(), &|_| ()).expect("it can be read");
+        // Triangles without area are counted when a tree is built.
+        let zero_area_triangles = loaded.report.zero_area_triangles;
+        assert_eq!(ReadReport { zero_area_triangles, ..report }, loaded.report);
+        assert_eq!(spooled.bounds, loaded.mesh.bounds());
+        assert_eq!(spooled.to_mesh().expect("readable"), loaded.mesh);
+        assert!(spooled::announced(&path).is_some());
+    }
+    loaded
 }
 
 /// The error's message, which is one line and names the file.
@@ -36,6 +48,10 @@ fn refusal(name: &str, content: impl AsRef<[u8]>) -> String {
     let folder = Folder::new();
     let path = folder.put(name, content);
     let message = mesh::read(&path).expect_err("this should not load").to_string();
+    if name.ends_with(".ply") {
+        let spooled = spooled::read(&path, folder.0.path(), &|_| ()).expect_err("nor should this");
+        assert_eq!(spooled.to_string(), message);
+    }
     assert_eq!(message.lines().count(), 1, "more than one line: {message}");
     assert!(!message.contains(char::is_control), "control characters: {message:?}");
     assert!(message.contains(path.to_str().unwrap()), "does not name the file: {message}");

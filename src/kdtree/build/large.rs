@@ -14,12 +14,13 @@ use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::memory::{Ledger, bytes_of};
 use crate::kdtree::node::Node;
-use crate::kdtree::params::MOST_BINS;
+use crate::kdtree::params::{BuildParams, MOST_BINS};
 use crate::kdtree::sah::{CellCost, Split};
 use rayon::prelude::*;
+use std::convert::Infallible;
 
 /// References in a chunk: half a megabyte, what a core's own cache holds.
-const CHUNK: usize = 16_384;
+pub const CHUNK: usize = 16_384;
 
 /// A node with fewer references is one task.
 const SMALL: usize = 8192;
@@ -29,18 +30,48 @@ const MANY: usize = 8 * CHUNK;
 const FINER: usize = 8;
 
 /// References, chunk after chunk; none is empty.
-type Chunks = Vec<Vec<Reference>>;
+pub type Chunks = Vec<Vec<Reference>>;
+
+/// A large node's references, wherever they are.
+pub trait Gather: Sync {
+    /// Why they cannot be had.
+    type Error: Send;
+
+    /// Shows all chunks, on all threads: values that begin as `empty` take them in by `add`, and become one by
+    /// `join`, in the order of the chunks.
+    fn gather<T: Send>(
+        &self,
+        empty: impl Fn() -> T + Sync + Send,
+        add: impl Fn(T, &[Reference]) -> T + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> Result<T, Self::Error>;
+}
+
+impl Gather for Chunks {
+    type Error = Infallible;
+
+    fn gather<T: Send>(
+        &self,
+        empty: impl Fn() -> T + Sync + Send,
+        add: impl Fn(T, &[Reference]) -> T + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> Result<T, Infallible> {
+        Ok(self.par_iter().fold(&empty, |value, chunk| add(value, chunk)).reduce(&empty, join))
+    }
+}
 
 /// The references of all triangles, whole.
 pub fn chunks_of(triangles: &[Triangle]) -> Chunks {
-    let whole = |(primitive, triangle): (u32, &Triangle)| {
+    let chunk = |(chunk, triangles): (usize, &[Triangle])| whole((chunk * CHUNK) as u32, triangles).collect();
+    triangles.par_chunks(CHUNK).enumerate().map(chunk).collect()
+}
+
+/// The references of triangles whose ids begin with `first`, whole.
+pub fn whole(first: u32, triangles: &[Triangle]) -> impl Iterator<Item = Reference> {
+    let reference = |(primitive, triangle): (u32, &Triangle)| {
         Reference::new(primitive, &Aabb::of_points(triangle.corners.map(Into::into)))
     };
-    let chunk = |(chunk, triangles): (usize, &[Triangle])| {
-        let first = (chunk * CHUNK) as u32;
-        (first..).zip(triangles).map(whole).collect()
-    };
-    triangles.par_chunks(CHUNK).enumerate().map(chunk).collect()
+    (first..).zip(triangles).map(reference)
 }
 
 /// A part of the tree that is done.
@@ -61,7 +92,8 @@ pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
         return Part::Whole(subtree::build(context, references, place));
     }
     let split = context.may_split(count, &place).and_then(|costs| {
-        let split = best_split(context, &chunks, count, &costs)?;
+        let Ok(split) = best_split(context.params, &chunks, count, &costs);
+        let split = split?;
         (split.cost < costs.leaf(count)).then_some(split)
     });
     let Some(split) = split else { return leaf(context, chunks, &place) };
@@ -93,42 +125,47 @@ fn leaf(context: &Context, chunks: Chunks, place: &Place) -> Part {
 }
 
 /// The cheapest plane found; `None` if none divides.
-fn best_split(context: &Context, chunks: &Chunks, count: usize, costs: &CellCost) -> Option<Split> {
-    let bins = context.params.bins;
-    let bins = if count > MANY { (bins * FINER).min(MOST_BINS) } else { bins };
-    let extent_of = |chunk: &Vec<Reference>| {
-        let mut extent = Extent::NONE;
+pub fn best_split<G: Gather>(
+    params: &BuildParams,
+    references: &G,
+    count: usize,
+    costs: &CellCost,
+) -> Result<Option<Split>, G::Error> {
+    let bins = if count > MANY { (params.bins * FINER).min(MOST_BINS) } else { params.bins };
+    let grown = |mut extent: Extent, chunk: &[Reference]| {
         extent.grow(chunk);
         extent
     };
-    let extent = chunks.par_iter().map(extent_of).reduce(|| Extent::NONE, Extent::union);
+    let extent = references.gather(|| Extent::NONE, grown, Extent::union)?;
     let frame = Frame::new(&extent, bins);
     let empty = || {
         let mut table = Table::default();
         table.reset(bins);
         table
     };
-    let counted = |mut table: Table, chunk: &Vec<Reference>| {
+    let counted = |mut table: Table, chunk: &[Reference]| {
         table.count(chunk, &frame);
         table
     };
-    let table = chunks.par_iter().fold(empty, counted).reduce(empty, |mut a, b| {
+    let added = |mut a: Table, b: Table| {
         a.add(&b);
         a
-    });
-    let Some(boundary) = table.best_boundary(&frame, costs, count) else {
-        return binned::ends_of_extent(&frame, costs, count);
     };
-    let gathered = |mut events: Vec<Event>, chunk: &Vec<Reference>| {
+    let table = references.gather(empty, counted, added)?;
+    let Some(boundary) = table.best_boundary(&frame, costs, count) else {
+        return Ok(binned::ends_of_extent(&frame, costs, count));
+    };
+    let gathered = |mut events: Vec<Event>, chunk: &[Reference]| {
         boundary.gather(chunk, &frame, &mut events);
         events
     };
-    let mut events = chunks.par_iter().fold(Vec::new, gathered).reduce(Vec::new, |mut a, b| {
+    let appended = |mut a: Vec<Event>, b: Vec<Event>| {
         a.extend_from_slice(&b);
         a
-    });
+    };
+    let mut events = references.gather(Vec::new, gathered, appended)?;
     events.par_sort_unstable();
-    boundary.refine(&events, &table, &frame, costs, count)
+    Ok(boundary.refine(&events, &table, &frame, costs, count))
 }
 
 /// The references below a plane and above.

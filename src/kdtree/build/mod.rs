@@ -12,8 +12,8 @@
 mod binned;
 mod exact;
 mod few;
-mod large;
-mod partition;
+pub(super) mod large;
+pub(super) mod partition;
 mod reference;
 mod subtree;
 
@@ -40,6 +40,12 @@ impl BuildProgress {
     pub fn fraction(&self) -> f64 {
         self.millionths.load(Ordering::Relaxed) as f64 * 1e-6
     }
+
+    /// A part of 1 more is done. Parts are tiny: what is rounded away shows as a bar that ends a little short
+    /// of full.
+    pub(super) fn add(&self, share: f64) {
+        self.millionths.fetch_add((share * 1e6).round() as u64, Ordering::Relaxed);
+    }
 }
 
 /// Nodes, with the root first, and the leaves' references, in the order of a depth-first walk.
@@ -62,29 +68,16 @@ pub(super) fn build(
     ledger: &Ledger,
     progress: Option<&BuildProgress>,
 ) -> Result<Built> {
-    let budget = (triangles.len() as f64 * f64::from(params.max_duplication)) as usize + SPARE;
+    let budget = budget_of(triangles.len(), params);
     if budget > MAX_INDEX / 4 && triangles.len() > MAX_INDEX / 16 {
         return Err(Error::Mesh(format!(
             "{} triangles are more than one tree can hold; split the model",
             triangles.len()
         )));
     }
-    let context = Context {
-        params,
-        triangles,
-        depth_limit: params.depth_limit(triangles.len()),
-        isa: Chosen::best(),
-        ledger,
-        progress,
-    };
-    let place = Place {
-        cell: bounds,
-        depth: 0,
-        bad_splits: 0,
-        budget: budget.min(MAX_INDEX / 4),
-        in_flight: (triangles.len() as f64 * IN_FLIGHT) as usize,
-        share: 1.0,
-    };
+    let depth_limit = params.depth_limit(triangles.len());
+    let context = Context { params, triangles, depth_limit, isa: Chosen::best(), ledger, progress };
+    let place = Place::of_root(bounds, triangles.len(), budget.min(MAX_INDEX / 4));
     let chunks = large::chunks_of(triangles);
     ledger.add(chunks.iter().map(bytes_of).sum());
     let part = large::build(&context, chunks, place);
@@ -94,36 +87,42 @@ pub(super) fn build(
     Ok(part.gathered(ledger))
 }
 
+/// How many nodes and references a tree of so many triangles may have together.
+pub(super) fn budget_of(triangles: usize, params: &BuildParams) -> usize {
+    (triangles as f64 * f64::from(params.max_duplication)) as usize + SPARE
+}
+
 /// What every node of a build needs to know.
-struct Context<'a> {
-    params: &'a BuildParams,
-    triangles: &'a [Triangle],
-    depth_limit: usize,
-    isa: Chosen,
-    ledger: &'a Ledger,
-    progress: Option<&'a BuildProgress>,
+pub(super) struct Context<'a> {
+    pub params: &'a BuildParams,
+    /// By the primitive ids of the references.
+    pub triangles: &'a [Triangle],
+    pub depth_limit: usize,
+    pub isa: Chosen,
+    pub ledger: &'a Ledger,
+    pub progress: Option<&'a BuildProgress>,
 }
 
 /// What a node inherits.
 #[derive(Clone, Copy)]
-struct Place {
-    cell: Aabb,
-    depth: usize,
+pub(super) struct Place {
+    pub cell: Aabb,
+    pub depth: usize,
     /// Splits in a row that cost more than a leaf.
     bad_splits: u32,
     /// How many references and nodes it may have together.
-    budget: usize,
+    pub budget: usize,
     /// How many references its descendants may hold at a time.
     in_flight: usize,
     /// Its share of the whole work, for the progress bar.
-    share: f64,
+    pub share: f64,
 }
 
 /// A tree of two children each has nearly two nodes for each leaf.
 const NODES_PER_LEAF: usize = 2;
 
 /// What to do about a split.
-enum Verdict {
+pub(super) enum Verdict {
     /// It is better than a leaf.
     Good,
     /// It is not, but the next ones may be; it is the so-manieth in a row.
@@ -132,7 +131,7 @@ enum Verdict {
 
 impl Context<'_> {
     /// The cost model of a node that may be split at all.
-    fn may_split(&self, count: usize, place: &Place) -> Option<CellCost<'_>> {
+    pub fn may_split(&self, count: usize, place: &Place) -> Option<CellCost<'_>> {
         if count <= self.params.min_leaf || place.depth >= self.depth_limit {
             return None;
         }
@@ -173,18 +172,23 @@ impl Context<'_> {
     }
 
     /// A subtree is done that had this share of the work.
-    fn finished(&self, share: f64) {
-        // Shares are tiny: what is rounded away shows as a bar that ends a little short of full.
+    pub fn finished(&self, share: f64) {
         if let Some(progress) = self.progress {
-            progress.millionths.fetch_add((share * 1e6).round() as u64, Ordering::Relaxed);
+            progress.add(share);
         }
     }
 }
 
 impl Place {
+    /// The root's, of a tree of so many triangles.
+    pub fn of_root(bounds: Aabb, triangles: usize, budget: usize) -> Self {
+        let in_flight = (triangles as f64 * IN_FLIGHT) as usize;
+        Self { cell: bounds, depth: 0, bad_splits: 0, budget, in_flight, share: 1.0 }
+    }
+
     /// The places of the children, with so many references below and above, of a node of `count`; `None`
     /// if the split must not be.
-    fn children(
+    pub fn children(
         &self,
         split: &Split,
         verdict: &Verdict,

@@ -2,9 +2,22 @@
 
 use super::reference::Reference;
 use crate::geometry::clip::Clipper;
-use crate::geometry::triangle::Triangle;
+use crate::geometry::triangle::{Corners, Triangle};
 use crate::kdtree::sah::Split;
 use crate::simd::{Chosen, Simd, Task};
+
+/// Triangles by primitive id.
+pub trait Lookup {
+    /// The corners of one that is among them.
+    fn corners(&self, primitive: u32) -> &Corners;
+}
+
+impl Lookup for [Triangle] {
+    #[inline(always)]
+    fn corners(&self, primitive: u32) -> &Corners {
+        &self[primitive as usize].corners
+    }
+}
 
 /// Memory that dividing reuses.
 #[derive(Default)]
@@ -22,12 +35,12 @@ impl Divider {
     /// touches the plane stays on its own side, one that lies in the plane goes to the side that the
     /// split names. One that crosses is clipped to both sides, and left out of a side that its true
     /// shape does not reach (its bounds had overstated it).
-    pub fn divide(
+    pub fn divide<T: Lookup + ?Sized>(
         &mut self,
         isa: Chosen,
         references: &mut Vec<Reference>,
         start: usize,
-        triangles: &[Triangle],
+        triangles: &T,
         split: &Split,
     ) -> &[Reference] {
         let count = references.len() - start;
@@ -43,15 +56,15 @@ impl Divider {
 
 /// A pass over a node's references; what stays moves to the front of `list`, what goes is written to
 /// the front of `below`, which is as long.
-struct Division<'a> {
+struct Division<'a, T: ?Sized> {
     list: &'a mut [Reference],
     below: &'a mut [Reference],
-    triangles: &'a [Triangle],
+    triangles: &'a T,
     split: &'a Split,
     clipper: &'a mut Clipper,
 }
 
-impl Task for Division<'_> {
+impl<T: Lookup + ?Sized> Task for Division<'_, T> {
     /// How many stay, and how many go.
     type Output = (usize, usize);
 
@@ -76,7 +89,7 @@ impl Task for Division<'_> {
                 stay += usize::from(!goes);
             } else {
                 let primitive = reference.primitive();
-                let corners = &triangles[primitive as usize].corners;
+                let corners = triangles.corners(primitive);
                 let parts = clipper.halves(corners, &reference.bounds(), axis, position);
                 // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
                 let lost = parts == [None; 2];

@@ -1,12 +1,13 @@
 //! What the builder sorts: triangles' parts.
 
 use crate::geometry::Aabb;
+use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
 /// The box around a triangle's part in a cell, and which triangle it is: half a cache line, two
 /// registers of four.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(32))]
 pub struct Reference {
     /// The least corner; in the last lane, the primitive id's bits.
     low: [f32; 4],
@@ -26,6 +27,12 @@ impl Reference {
     #[inline(always)]
     pub fn primitive(&self) -> u32 {
         self.low[3].to_bits()
+    }
+
+    /// The same part of a triangle that goes by another id.
+    pub fn renamed(mut self, primitive: u32) -> Self {
+        self.low[3] = f32::from_bits(primitive);
+        self
     }
 
     /// The part's least coordinate along an axis.

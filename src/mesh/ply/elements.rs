@@ -3,35 +3,35 @@
 use super::body::Source;
 use super::header::{Element, Kind, Scalar};
 use crate::mesh::color;
+use crate::mesh::lists::{List, Lists};
 use glam::Vec3;
 
 /// Which item of an element is wrong (counted from 0), and what is wrong with it.
 pub(super) type ItemError = (u64, String);
 
 /// Colours as they are collected; all sRGB-encoded.
-#[derive(Debug, Default)]
-pub(super) enum Shades {
-    #[default]
+pub(in crate::mesh) enum Shades<L: Lists> {
     None,
-    Bytes(Vec<[u8; 3]>),
-    Floats(Vec<[f32; 3]>),
+    Bytes(L::Of<[u8; 3]>),
+    Floats(L::Of<[f32; 3]>),
 }
 
-impl Shades {
+impl<L: Lists> Shades<L> {
     /// Makes the colours of a new element's items, whose type is `kind`, follow `done` items.
-    fn begin(&mut self, kind: Scalar, done: usize) {
+    fn begin(&mut self, lists: &L, kind: Scalar, done: usize) -> Result<(), ItemError> {
         let grey = color::encode(color::DEFAULT);
         if matches!(self, Self::None) {
             *self = match kind.is_float() {
-                true => Self::Floats(Vec::new()),
-                false => Self::Bytes(Vec::new()),
+                true => Self::Floats(lists.list().map_err(no_list)?),
+                false => Self::Bytes(lists.list().map_err(no_list)?),
             };
         }
         match self {
             Self::None => {}
-            Self::Bytes(colors) => colors.resize(done, grey),
-            Self::Floats(colors) => colors.resize(done, grey.map(|c| f32::from(c) / 255.0)),
+            Self::Bytes(colors) => colors.fill(grey, done),
+            Self::Floats(colors) => colors.fill(grey.map(|c| f32::from(c) / 255.0), done),
         }
+        Ok(())
     }
 
     /// Gives the next `count` items the colour that an element states.
@@ -44,14 +44,9 @@ impl Shades {
         };
         match self {
             Self::None => {}
-            Self::Bytes(colors) => colors.extend(std::iter::repeat_n(color.map(byte), count)),
-            Self::Floats(colors) if kind.is_float() => {
-                colors.extend(std::iter::repeat_n(color.map(|c| c as f32), count));
-            }
-            Self::Floats(colors) => {
-                let color = color.map(|c| f32::from(byte(c)) / 255.0);
-                colors.extend(std::iter::repeat_n(color, count));
-            }
+            Self::Bytes(colors) => colors.push_times(color.map(byte), count),
+            Self::Floats(colors) if kind.is_float() => colors.push_times(color.map(|c| c as f32), count),
+            Self::Floats(colors) => colors.push_times(color.map(|c| f32::from(byte(c)) / 255.0), count),
         }
     }
 }
@@ -165,16 +160,21 @@ pub(super) fn skip<S: Source>(
     Ok(())
 }
 
-/// Element `vertex`.
-#[derive(Default)]
-pub(super) struct Vertices {
-    pub positions: Vec<Vec3>,
-    pub shades: Shades,
+/// No list could be begun.
+fn no_list(error: std::io::Error) -> ItemError {
+    (0, format!("there is no room for what it holds: {error}"))
 }
 
-impl Vertices {
+/// Element `vertex`.
+pub(super) struct Vertices<L: Lists> {
+    pub positions: L::Of<Vec3>,
+    pub shades: Shades<L>,
+}
+
+impl<L: Lists> Vertices<L> {
     pub fn read<S: Source>(
         &mut self,
+        lists: &L,
         element: &Element,
         source: &mut S,
         row: &mut dyn FnMut(u64, &S),
@@ -184,9 +184,9 @@ impl Vertices {
             return Err((0, "it has no properties x, y and z".into()));
         }
         // The caller made sure that the file is large enough for so many.
-        self.positions.reserve_exact(element.count as usize);
+        self.positions.expect(element.count as usize);
         if let Some(kind) = layout.color {
-            self.shades.begin(kind, 0);
+            self.shades.begin(lists, kind, 0)?;
         }
         let mut item = Item::default();
         for index in 0..element.count {
@@ -202,24 +202,25 @@ impl Vertices {
 }
 
 /// Elements `face` and `tristrips`.
-pub(super) struct Faces {
+pub(super) struct Faces<L: Lists> {
     vertex_count: u32,
-    pub triangles: Vec<[u32; 3]>,
-    pub shades: Shades,
+    pub triangles: L::Of<[u32; 3]>,
+    pub shades: Shades<L>,
     pub polygons: u64,
     pub short: u64,
     pub strips: u64,
 }
 
-impl Faces {
+impl<L: Lists> Faces<L> {
     /// No faces yet, of a file of so many vertices.
-    pub fn new(vertex_count: u32) -> Self {
-        Self { vertex_count, triangles: Vec::new(), shades: Shades::None, polygons: 0, short: 0, strips: 0 }
+    pub fn new(vertex_count: u32, triangles: L::Of<[u32; 3]>) -> Self {
+        Self { vertex_count, triangles, shades: Shades::None, polygons: 0, short: 0, strips: 0 }
     }
 
     /// Reads polygons, or `strips`.
     pub fn read<S: Source>(
         &mut self,
+        lists: &L,
         element: &Element,
         source: &mut S,
         strips: bool,
@@ -231,10 +232,10 @@ impl Faces {
         }
         if !strips {
             // The caller made sure that the file is large enough for so many.
-            self.triangles.reserve_exact(element.count as usize);
+            self.triangles.expect(element.count as usize);
         }
         if let Some(kind) = layout.color {
-            self.shades.begin(kind, self.triangles.len());
+            self.shades.begin(lists, kind, self.triangles.len())?;
         }
         let mut item = Item::default();
         for index in 0..element.count {
@@ -249,7 +250,7 @@ impl Faces {
         }
         // Faces and strips side by side, of which only one has colours.
         if layout.color.is_none() && !matches!(self.shades, Shades::None) {
-            self.shades.begin(Scalar::U8, self.triangles.len());
+            self.shades.begin(lists, Scalar::U8, self.triangles.len())?;
         }
         Ok(())
     }

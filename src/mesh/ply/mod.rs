@@ -21,9 +21,12 @@ pub use parts::PartWriter;
 pub use write::write;
 
 use super::color;
+use super::lists::{InMemory, Lists};
 use super::{Colors, Mesh, ReadReport};
 use body::{Ascii, Binary, Source};
-use elements::{Faces, Shades, Vertices};
+pub(super) use elements::Shades;
+use elements::{Faces, Vertices};
+use glam::Vec3;
 use header::{Element, Encoding, Header};
 use std::path::Path;
 
@@ -37,25 +40,59 @@ pub(super) fn parse(
     report: &mut ReadReport,
     progress: &dyn Fn(f32),
 ) -> Result<Mesh, String> {
+    let raw = parse_to(&InMemory, bytes, report, progress)?;
+    let colors = match (raw.of_faces.finish(), raw.of_vertices.finish()) {
+        (Some(of_faces), _) => Colors::PerTriangle(of_faces),
+        (None, Some(of_vertices)) => Colors::PerVertex(of_vertices),
+        (None, None) => Colors::default(),
+    };
+    Ok(Mesh { positions: raw.positions, triangles: raw.triangles, colors })
+}
+
+/// What a PLY file holds, as it stands there.
+pub(super) struct Raw<L: Lists> {
+    pub positions: L::Of<Vec3>,
+    pub triangles: L::Of<[u32; 3]>,
+    pub of_faces: Shades<L>,
+    pub of_vertices: Shades<L>,
+}
+
+/// The numbers of vertices and faces that a PLY file's header announces; `None` if it is no PLY file.
+pub(super) fn announced(bytes: &[u8]) -> Option<(u64, u64)> {
+    let header = Header::parse(bytes).ok()?;
+    let count = |name| header.elements.iter().filter(|element| element.name == name).map(|e| e.count).sum();
+    Some((count("vertex"), count("face")))
+}
+
+/// Parses a PLY file's bytes, to lists of a kind.
+pub(super) fn parse_to<L: Lists>(
+    lists: &L,
+    bytes: &[u8],
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+) -> Result<Raw<L>, String> {
     let header = Header::parse(bytes)?;
     let body = &bytes[header.size..];
     match header.encoding {
-        Encoding::Ascii => read_body(Ascii::new(body, header.lines), &header, report, progress),
-        Encoding::LittleEndian => read_body(Binary::<false>::new(body), &header, report, progress),
-        Encoding::BigEndian => read_body(Binary::<true>::new(body), &header, report, progress),
+        Encoding::Ascii => read_body(lists, Ascii::new(body, header.lines), &header, report, progress),
+        Encoding::LittleEndian => read_body(lists, Binary::<false>::new(body), &header, report, progress),
+        Encoding::BigEndian => read_body(lists, Binary::<true>::new(body), &header, report, progress),
     }
 }
 
-fn read_body<S: Source>(
+fn read_body<L: Lists, S: Source>(
+    lists: &L,
     mut source: S,
     header: &Header,
     report: &mut ReadReport,
     progress: &dyn Fn(f32),
-) -> Result<Mesh, String> {
+) -> Result<Raw<L>, String> {
     let size = source.remaining().max(1) as f32;
     let vertex_count = header.vertex_count()?;
-    let mut vertices = Vertices::default();
-    let mut faces = Faces::new(vertex_count);
+    let no_list = |error| format!("there is no room for what it holds: {error}");
+    let mut vertices =
+        Vertices { positions: lists.list::<Vec3>().map_err(no_list)?, shades: Shades::<L>::None };
+    let mut faces = Faces::<L>::new(vertex_count, lists.list().map_err(no_list)?);
     for element in &header.elements {
         check_room(element, &source)?;
         let mut row = |index: u64, source: &S| {
@@ -64,9 +101,9 @@ fn read_body<S: Source>(
             }
         };
         let result = match element.name.as_str() {
-            "vertex" => vertices.read(element, &mut source, &mut row),
-            "face" => faces.read(element, &mut source, false, &mut row),
-            "tristrips" => faces.read(element, &mut source, true, &mut row),
+            "vertex" => vertices.read(lists, element, &mut source, &mut row),
+            "face" => faces.read(lists, element, &mut source, false, &mut row),
+            "tristrips" => faces.read(lists, element, &mut source, true, &mut row),
             _ => elements::skip(element, &mut source, &mut row),
         };
         result.map_err(|(index, message)| {
@@ -77,12 +114,12 @@ fn read_body<S: Source>(
     report.polygons = faces.polygons;
     report.short_faces = faces.short;
     report.strips = faces.strips;
-    let colors = match (faces.shades.finish(), vertices.shades.finish()) {
-        (Some(of_faces), _) => Colors::PerTriangle(of_faces),
-        (None, Some(of_vertices)) => Colors::PerVertex(of_vertices),
-        (None, None) => Colors::default(),
-    };
-    Ok(Mesh { positions: vertices.positions, triangles: faces.triangles, colors })
+    Ok(Raw {
+        positions: vertices.positions,
+        triangles: faces.triangles,
+        of_faces: faces.shades,
+        of_vertices: vertices.shades,
+    })
 }
 
 /// Refuses an element that cannot fit into what is left of the file, before anything is allocated
@@ -102,7 +139,7 @@ fn check_room<S: Source>(element: &Element, source: &S) -> Result<(), String> {
     Ok(())
 }
 
-impl Shades {
+impl Shades<InMemory> {
     /// The colours as bytes; nothing if no element had any.
     fn finish(self) -> Option<Vec<[u8; 3]>> {
         match self {

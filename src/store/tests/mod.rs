@@ -1,6 +1,7 @@
 //! Scene files: written and read back to the bit, and broken on purpose.
 
 mod damage;
+mod large;
 mod round_trip;
 
 use super::{File, Written};

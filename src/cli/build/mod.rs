@@ -1,5 +1,7 @@
 //! `raypack build MODEL... -o scene.rpk`: models to one scene file.
 
+mod large;
+
 use super::model::Model;
 use super::options::BuildOptions;
 use super::outputs::same_file;
@@ -20,6 +22,9 @@ use std::time::Instant;
 ///
 /// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
 /// become one scene. Primitive ids run on from model to model in the order in which they are named.
+///
+/// With --memory, a PLY model that is larger than that, with its tree, is read and built piece by piece: the same
+/// scene, in more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// The models: .obj or .ply, or .rpk scene files, whose trees are built anew
@@ -40,12 +45,16 @@ struct Report<'a> {
     models: &'a [ModelReport],
     triangles: usize,
     vertices: u64,
+    /// Of a tree that was built in parts, until all is on the disk.
     build_seconds: f64,
     build_memory: BuildMemory,
+    /// In how many parts the tree was built, if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parts: Option<usize>,
     build_params: &'a BuildParams,
     tree: &'a TreeStats,
-    /// Seconds of checksums and of writing, until all is on the disk.
-    write_seconds: f64,
+    /// Seconds of checksums and of writing, until all is on the disk; `None` if that went along with building.
+    write_seconds: Option<f64>,
     file: &'a Path,
     bytes: u64,
     sections: &'a [Section],
@@ -69,6 +78,28 @@ pub fn run(args: &Args) -> Result<()> {
     args.check_output()?;
     args.json.check()?;
 
+    if let Some(limit) = args.build.limit()?
+        && large::is_called_for(&args.models, &args.build, &profile.build)?
+    {
+        let large = large::build(args, &profile.build, limit)?;
+        let report = Report {
+            engine: ENGINE,
+            triangles: large.model.triangles,
+            vertices: large.model.vertices as u64,
+            models: &[large.model],
+            build_seconds: large.seconds,
+            build_memory: large.memory,
+            parts: Some(large.parts),
+            build_params: &profile.build,
+            tree: &large.tree,
+            write_seconds: None,
+            file: &args.output,
+            bytes: large.written.bytes,
+            sections: &large.written.sections,
+        };
+        return args.json.give(&text(&report), &report);
+    }
+
     let (model, models) = read(&args.models)?;
     let source = model.name.clone();
     let scene = model.build(&args.build, &profile.build, isa)?;
@@ -87,9 +118,10 @@ pub fn run(args: &Args) -> Result<()> {
         vertices: scene.vertices,
         build_seconds,
         build_memory,
+        parts: None,
         build_params: scene.accel.tree().params(),
         tree: &scene.tree,
-        write_seconds,
+        write_seconds: Some(write_seconds),
         file: &args.output,
         bytes: written.bytes,
         sections: &written.sections,
@@ -157,9 +189,28 @@ fn text(report: &Report<'_>) -> String {
         lines.add("scene", counted(report.models.len() as u64, "model"));
     }
     describe_size(&mut lines, report.triangles as u64, report.vertices);
-    report.build_memory.describe(&mut lines, report.build_seconds);
+    match report.parts {
+        None => report.build_memory.describe(&mut lines, report.build_seconds),
+        Some(parts) => describe_parts(&mut lines, report, parts),
+    }
     describe_tree(&mut lines, report.tree);
-    let (file, size, time) = (report.file.display(), bytes(report.bytes), duration(report.write_seconds));
-    lines.add("wrote", format!("{file}, {size}, in {time}"));
+    let time = report.write_seconds.map(|seconds| format!(", in {}", duration(seconds))).unwrap_or_default();
+    lines.add("wrote", format!("{}, {}{time}", report.file.display(), bytes(report.bytes)));
     lines.text().to_owned()
+}
+
+/// What is said of a tree that was built in parts.
+fn describe_parts(lines: &mut Lines, report: &Report<'_>, parts: usize) {
+    let BuildMemory { announced, counted: held, resident } = report.build_memory;
+    let resident = resident.map(|peak| format!(", the process {} at most", bytes(peak))).unwrap_or_default();
+    lines.add(
+        "built",
+        format!(
+            "in {}, in {}; the builder held {}{resident}, of {} given",
+            duration(report.build_seconds),
+            counted(parts as u64, "part"),
+            bytes(held as u64),
+            bytes(announced as u64)
+        ),
+    );
 }
