@@ -45,6 +45,25 @@ fn pictures_are_the_same_within_the_memory_given() {
 }
 
 #[test]
+fn a_first_picture_is_written_beside_the_frame() {
+    let place = place(150_000);
+    place.succeed("render plant.rpk -o whole.png --size 160x120");
+    let options = "--size 160x120 --memory 48MiB --first-within 1";
+    let text = place.succeed(&format!("render plant.rpk -o part.png {options} --json part.json"));
+    assert!(text.contains("pixels drawn as boxes: part.first.png"), "{text}");
+    assert!(place.read("part.png") == place.read("whole.png") && !place.read("part.first.png").is_empty());
+    let first = place.json("part.json")["frames"][0]["first"].clone();
+    let stand_ins = first["stand_ins"].as_f64().expect("a part");
+    assert!(stand_ins > 0.0 && stand_ins <= 1.0 && first["file"] == "part.first.png", "{first}");
+    place.succeed(&format!("render plant.rpk -o path.png {options} --orbit 2"));
+    assert!(!place.read("path_001.first.png").is_empty());
+    let refused = "render plant.rpk -o out.png --memory 48MiB --first-within 0";
+    place.fail(refused, &["--first-within: 0 is no time"]);
+    let refused = "render plant.ply -o out.png --memory 48MiB --first-within 9";
+    place.fail(refused, &["--first-within: only of a .rpk scene file"]);
+}
+
+#[test]
 fn too_little_memory_and_nonsense_are_refused_beforehand() {
     let place = place(20_000);
     for (options, expected) in [

@@ -5,6 +5,7 @@
 //! it any more.
 
 use super::arena::Arena;
+use super::deadline::Deadline;
 use super::directory::{Asked, Directory, Pins};
 use super::epoch::Epochs;
 use super::gate::Gate;
@@ -13,13 +14,12 @@ use super::plan::{CacheOptions, Loading, Plan};
 use super::quota::Quota;
 use super::source::Source;
 use super::stats::{CacheStats, Counters, add, nanos};
+use super::sync::thread::{self, JoinHandle};
+use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, MutexGuard, Ordering, PoisonError};
 use super::words::Words;
 use crate::error::Error;
 use crossbeam::channel::{Receiver, Sender, bounded};
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// The most threads that may read at a time.
@@ -60,9 +60,17 @@ pub struct Blocks {
     most_committed: AtomicUsize,
     /// Whether a block had to go since this was last cleared.
     pub short: AtomicBool,
+    /// How often a thread has waited since this was last cleared.
+    pub waits: AtomicU32,
+    /// When threads stop waiting.
+    pub deadline: Deadline,
     failure: Mutex<Option<Error>>,
     failed: AtomicBool,
 }
+
+/// Blocks were not here when the time was over.
+#[derive(Debug)]
+pub struct Late;
 
 /// The loaders, which end when this is dropped.
 #[derive(Debug, Default)]
@@ -101,6 +109,8 @@ impl Blocks {
             limit: plan.all,
             most_committed: AtomicUsize::new(0),
             short: AtomicBool::new(false),
+            waits: AtomicU32::new(0),
+            deadline: Deadline::default(),
             failure: Mutex::default(),
             failed: AtomicBool::new(false),
             layout,
@@ -143,17 +153,35 @@ impl Blocks {
     ///
     /// `aside` is called before anything is waited for that another thread may have to have a place at the
     /// gate for: the caller must have none then.
-    pub fn gather(&self, loaders: &Loaders, wanted: &[u32], aside: impl FnOnce()) -> Gathered<'_> {
+    ///
+    /// # Errors
+    /// The deadline has passed. What was asked for still comes.
+    pub fn gather(
+        &self,
+        loaders: &Loaders,
+        wanted: &[u32],
+        aside: impl FnOnce(),
+    ) -> Result<Gathered<'_>, Late> {
+        if self.deadline.has_passed() {
+            return Err(Late);
+        }
         let mut aside = Some(aside);
-        let mut step_aside = || aside.take().map_or((), |aside| aside());
+        let mut step_aside = || {
+            if let Some(aside) = aside.take() {
+                self.waits.fetch_add(1, Ordering::Relaxed);
+                aside();
+            }
+        };
         let taken = self.quota.try_take(wanted.len()).unwrap_or_else(|| {
             step_aside();
             self.quota.take(wanted.len())
         });
+        let mut gathered = Gathered { blocks: self, pinned: Vec::with_capacity(wanted.len()), taken };
         let (mut absent, mut missed) = (Vec::new(), 0);
         for &block in wanted {
             let gone = &mut |gone| self.retire(gone);
             let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
+            gathered.pinned.push(block);
             missed += u64::from(asked != Asked::Here);
             if asked == Asked::Absent {
                 absent.push(block);
@@ -172,14 +200,16 @@ impl Blocks {
                 self.load(block, false);
             }),
         }
+        add(&self.counters.misses, missed);
         for &block in wanted {
             if !self.words.is_here(block as usize) {
                 step_aside();
-                self.directory(block).wait(block);
+                if !self.directory(block).wait(block, &self.deadline) {
+                    return Err(Late);
+                }
             }
         }
-        add(&self.counters.misses, missed);
-        Gathered { blocks: self, pinned: wanted.to_vec(), taken }
+        Ok(gathered)
     }
 
     /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
@@ -370,7 +400,6 @@ impl Drop for Loaders {
 #[cfg(test)]
 mod tests {
     use super::super::layout::Array;
-    use super::super::local::Local;
     use super::super::policy::Replacement;
     use super::*;
 
@@ -397,16 +426,29 @@ mod tests {
 
     /// Threads that ask for blocks at random, hold some for a while, and look whether they are what they
     /// should be, in a cache that is much too small for all.
-    fn stress(threads: usize, options: &CacheOptions, rounds: u32) {
+    fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
         const BLOCKS: usize = 60;
         let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0], BLOCK);
         let most = 3;
         let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
         let (blocks, loaders) =
             Blocks::new(layout, Box::new(Numbered), options, &plan, threads).expect("starts");
+        let late = AtomicU32::new(0);
         thread::scope(|scope| {
+            if bounded {
+                // Deadlines that come and go, which threads run into wherever they are.
+                let blocks = &blocks;
+                scope.spawn(move || {
+                    for i in 0..400 {
+                        let soon = Instant::now() + Duration::from_micros(i % 90);
+                        blocks.deadline.set((i % 4 != 0).then_some(soon));
+                        thread::sleep(Duration::from_micros(100));
+                    }
+                    blocks.deadline.set(None);
+                });
+            }
             for number in 0..threads as u32 {
-                let (blocks, loaders) = (&blocks, &loaders);
+                let (blocks, loaders, late) = (&blocks, &loaders, &late);
                 scope.spawn(move || {
                     let mut state = number.wrapping_mul(0x9e37_79b9) | 1;
                     let mut random = |below: usize| {
@@ -415,11 +457,14 @@ mod tests {
                         state ^= state << 5;
                         state as usize % below
                     };
-                    let local = Local::take(blocks);
+                    let reader = blocks.epochs.reader().expect("there is room");
                     for _ in 0..rounds {
                         let wanted: Vec<u32> = (0..=random(most)).map(|_| random(BLOCKS) as u32).collect();
-                        let gathered = blocks.gather(loaders, &wanted, || ());
-                        local.reader.enter();
+                        let Ok(gathered) = blocks.gather(loaders, &wanted, || ()) else {
+                            late.fetch_add(1, Ordering::Relaxed);
+                            continue;
+                        };
+                        reader.enter();
                         drop(gathered);
                         let found = || {
                             wanted.iter().all(|&block| {
@@ -431,14 +476,21 @@ mod tests {
                         assert!(found(), "{wanted:?} at once");
                         (0..random(4)).for_each(|_| thread::yield_now());
                         assert!(found(), "{wanted:?} later in the epoch");
-                        local.reader.leave();
+                        reader.leave();
                     }
-                    local.put();
                 });
             }
         });
         assert!(blocks.committed_bytes()[1] <= plan.all * BLOCK);
-        assert!(blocks.take_stats().evictions > u64::from(rounds));
+        let late = late.into_inner();
+        assert!(late > 0 || !bounded, "the test tests nothing");
+        assert!(bounded || blocks.take_stats().evictions > u64::from(rounds));
+        // Nothing is left pinned, or taken from the quota.
+        for block in 0..BLOCKS as u32 {
+            let _ = blocks.gather(&loaders, &[block], || ()).expect("there is no deadline");
+        }
+        blocks.clear();
+        assert_eq!(blocks.committed_bytes()[0], 0);
     }
 
     #[test]
@@ -454,7 +506,8 @@ mod tests {
                     loading,
                     direct: false,
                 };
-                stress(6, &options, 3000);
+                stress(6, &options, 3000, false);
+                stress(6, &options, 3000, true);
             }
         }
     }

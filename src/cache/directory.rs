@@ -8,12 +8,12 @@
 //! a while. That is bounded, because a thread pins no more than one page or leaf needs, and the budget holds
 //! it back beforehand.
 
+use super::deadline::Deadline;
 use super::policy::{Policy, Replacement, Use, Way};
+use super::sync::{AtomicU16, Condvar, Mutex, MutexGuard, Ordering, PoisonError};
 use super::words::Words;
 use crossbeam::utils::CachePadded;
 use std::collections::HashSet;
-use std::sync::atomic::{AtomicU16, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// How a cache is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,12 +176,19 @@ impl Directory {
         stripe.arrived.notify_all();
     }
 
-    /// Waits until a pinned block has come, or has failed to.
-    pub fn wait(&self, block: u32) {
+    /// Waits until a pinned block has come, or has failed to; whether that was before the deadline.
+    pub fn wait(&self, block: u32, deadline: &Deadline) -> bool {
         let (stripe, mut sets, _) = self.lock(block);
         while sets.coming.contains(&block) {
-            sets = stripe.arrived.wait(sets).unwrap_or_else(PoisonError::into_inner);
+            sets = match deadline.left() {
+                None => stripe.arrived.wait(sets).unwrap_or_else(PoisonError::into_inner),
+                Some(left) if left.is_zero() => return false,
+                Some(left) => {
+                    stripe.arrived.wait_timeout(sets, left).unwrap_or_else(PoisonError::into_inner).0
+                }
+            };
         }
+        true
     }
 
     /// Declares blocks gone that sets hold beyond their ways, but for pinned ones, and tells `gone`.
@@ -224,6 +231,7 @@ impl Directory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::{Duration, Instant};
 
     struct Small {
         directory: Directory,
@@ -279,10 +287,22 @@ mod tests {
         let small = Small::new(1, 1);
         assert_eq!(small.pin(1).0, Asked::Absent);
         small.directory.failed(1);
-        small.directory.wait(1);
+        assert!(small.directory.wait(1, &Deadline::default()));
         assert!(!small.words.is_here(1));
         assert_eq!(small.pin(1).0, Asked::Absent);
         assert_eq!(small.directory.len(), 1);
+    }
+
+    #[test]
+    fn nobody_waits_beyond_the_deadline() {
+        let small = Small::new(1, 1);
+        assert_eq!(small.pin(1).0, Asked::Absent);
+        let deadline = Deadline::default();
+        deadline.set(Some(Instant::now() + Duration::from_millis(5)));
+        assert!(!small.directory.wait(1, &deadline));
+        assert!(deadline.has_passed());
+        small.arrived(1);
+        assert!(small.directory.wait(1, &deadline), "it is here: there is nothing to wait for");
     }
 
     #[test]

@@ -17,9 +17,8 @@
 //!
 //! The fences forbid that (2) still sees the block and (5) does not yet see the reader.
 
+use super::sync::{Arc, AtomicU64, Mutex, Ordering, PoisonError, fence};
 use crossbeam::utils::CachePadded;
-use std::sync::atomic::{AtomicU64, Ordering, fence};
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// A slot's value while its reader is in no epoch: later than all.
 const IDLE: u64 = u64::MAX;

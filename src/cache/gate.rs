@@ -4,7 +4,7 @@
 //! another go on in its place. What a thread has begun and the blocks that it waited for are in its hands,
 //! so who comes back goes before who begins something new.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use super::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// A number of places.
 #[derive(Debug)]

@@ -26,10 +26,11 @@
 //! | `words` | a word for each block: here? used when, how often? |
 //! | `epoch` | who still reads, so that memory is not freed under him |
 //! | `directory`, `policy/` | sets of blocks behind striped locks, and which block makes room |
+//! | `deadline` | when threads stop waiting |
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
 //! | `blocks` | all of these at work: asking, loading, giving up |
 //! | `local`, `view` | a thread's state, and the tree as it sees it |
-//! | `plan` | how the memory is divided |
+//! | `plan`, `sync` | how the memory is divided; what threads share |
 //! | `source`, `file`, `at_once` | where blocks come from |
 //!
 //! **Waiting is a thread's.** More threads than processors take part; one that waits for a block keeps its
@@ -42,6 +43,7 @@
 mod arena;
 mod at_once;
 mod blocks;
+mod deadline;
 mod directory;
 mod epoch;
 mod file;
@@ -53,6 +55,7 @@ pub mod policy;
 mod quota;
 mod source;
 mod stats;
+mod sync;
 mod view;
 mod words;
 
@@ -65,13 +68,13 @@ pub use view::View;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
-use blocks::{Blocks, Loaders};
+use blocks::{Blocks, Late, Loaders};
 use layout::Layout;
 use local::Local;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::{Duration, Instant};
 use view::Unreadable;
 
 /// What is always in memory of a scene.
@@ -106,9 +109,14 @@ pub struct Cached {
     plan: Plan,
     /// Whether the last frame had to give blocks up.
     was_short: AtomicBool,
+    /// How often threads waited in the last frame; more than ever before the first.
+    waited: AtomicU32,
     blocks: Arc<Blocks>,
     loaders: Loaders,
 }
+
+/// More waits than a frame has, and some may come on top of them.
+const MANY: u32 = u32::MAX / 2;
 
 impl Cached {
     /// A scene of which up to `memory` bytes of blocks are in memory at a time, for `threads` at work.
@@ -150,8 +158,11 @@ impl Cached {
         };
         let (blocks, loaders) = Blocks::new(layout, source, options, &plan, threads).map_err(system)?;
         let Resident { scale, bounds, root, upper, beneath, .. } = resident;
-        let was_short = AtomicBool::new(false);
-        Ok(Self { scale, bounds, root, upper, beneath, options: *options, plan, was_short, blocks, loaders })
+        // Before the first frame, everything has still to come.
+        blocks.waits.store(MANY, Ordering::Relaxed);
+        let (was_short, waited) = (AtomicBool::new(false), AtomicU32::new(MANY));
+        let options = *options;
+        Ok(Self { scale, bounds, root, upper, beneath, options, plan, was_short, waited, blocks, loaders })
     }
 
     /// What was chosen.
@@ -162,11 +173,6 @@ impl Cached {
     /// How the memory is divided.
     pub fn plan(&self) -> &Plan {
         &self.plan
-    }
-
-    /// The box around all triangles, in the tree's coordinates.
-    pub fn bounds(&self) -> &Aabb {
-        &self.bounds
     }
 
     /// The same box in the mesh's coordinates.
@@ -189,14 +195,19 @@ impl Cached {
         self.blocks.committed_bytes()
     }
 
-    /// Threads that should trace so that `threads` are at work when some wait.
+    /// Threads that should trace so that `threads` are at work when some wait. After a frame in which hardly
+    /// anything had to be waited for, no more than these: who is not there need not be waited for either.
     pub fn workers(&self, threads: usize) -> usize {
-        self.options.loading.workers(threads)
+        /// So many waits in a frame are soon over.
+        const FEW: u32 = 16;
+        let is_calm = self.waited.load(Ordering::Relaxed) < FEW;
+        if is_calm { threads } else { self.options.loading.workers(threads) }
     }
 
     /// Begins a frame.
     pub fn begin_frame(&self) {
         self.was_short.store(self.blocks.short.swap(false, Ordering::Relaxed), Ordering::Relaxed);
+        self.waited.store(self.blocks.waits.swap(0, Ordering::Relaxed), Ordering::Relaxed);
     }
 
     /// Whether blocks have had to go, in this frame or in the one before: then it pays to need few of them.
@@ -240,6 +251,39 @@ impl Cached {
         }
     }
 
+    /// Has threads wait for blocks until then and no longer: see [`in_time`](Self::in_time).
+    pub fn set_deadline(&self, deadline: Option<Instant>) {
+        self.blocks.deadline.set(deadline);
+    }
+
+    /// Whether there is a deadline that has passed.
+    pub fn is_late(&self) -> bool {
+        self.blocks.deadline.has_passed()
+    }
+
+    /// Runs something on this thread that reads the scene; `None` if the deadline passes while it waits for a
+    /// block. What it had asked for still comes.
+    pub fn in_time<R>(&self, run: impl FnOnce() -> R) -> Option<R> {
+        if self.is_late() {
+            return None;
+        }
+        match panic::catch_unwind(AssertUnwindSafe(run)) {
+            Ok(done) => Some(done),
+            Err(payload) if payload.is::<Late>() => None,
+            Err(payload) => panic::resume_unwind(payload),
+        }
+    }
+
+    /// The upper tree, which is always here: see [`Tree::upper`](crate::kdtree::Tree::upper).
+    pub fn upper(&self) -> &[Node] {
+        &self.upper
+    }
+
+    /// The box around all triangles, in the tree's coordinates.
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
     /// What the cache did since the last call.
     pub fn take_stats(&self) -> CacheStats {
         self.blocks.take_stats()
@@ -258,6 +302,7 @@ impl Cached {
     /// Forgets all that is not in use at the moment.
     pub fn clear(&self) {
         self.blocks.clear();
+        self.blocks.waits.store(MANY, Ordering::Relaxed);
     }
 }
 

@@ -1,6 +1,6 @@
 //! How many blocks may be pinned at a time.
 
-use std::sync::{Condvar, Mutex, PoisonError};
+use super::sync::{Condvar, Mutex, PoisonError};
 
 /// A number that threads take from, all that one needs at once, and give back: nobody holds some while he
 /// waits for more, so all come to their turn.

@@ -1,7 +1,7 @@
 //! What a cache did.
 
+use super::sync::{AtomicU64, Ordering};
 use serde::Serialize;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Counts of a cache's work, since it was opened or they were last taken.

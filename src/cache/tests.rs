@@ -353,3 +353,101 @@ fn a_file_that_is_replaced_stays_and_one_that_is_cut_is_an_error() {
     let frame = frame_of(&Accel::of_cached(cached), &scene.mesh, &scene.resident).expect("it is still open");
     assert!(frame == expected);
 }
+
+#[test]
+fn a_first_picture_is_there_before_all_blocks_are_and_the_last_is_the_same() {
+    let scene = Scene::new(plant::generate(PlantParams { triangles: 60_000, seed: 3 }));
+    let mut settings = RenderSettings::new(Size { width: 96, height: 80 });
+    settings.aovs.depth = true;
+    settings.tuning.threads = 2;
+    let camera = scene.camera();
+    let lighting = Lighting::for_view(&camera, &scene.resident);
+    let expected = Renderer::new(&scene.resident, &scene.mesh, settings.clone())
+        .expect("sensible")
+        .frame(&camera, &lighting)
+        .0;
+    for loading in [Loading::Synchronous, Loading::Asynchronous { loaders: 3 }] {
+        let options = CacheOptions { loading, ..CacheOptions::default() };
+        let source = InMemory { slow: 2000, ..scene.source() };
+        let cached = scene.open(&options, 300, 2, source);
+        let accel = Accel::of_cached(Arc::clone(&cached));
+        let renderer = Renderer::new(&accel, &scene.mesh, settings.clone()).expect("sensible");
+        let draw = |limit| {
+            let done = AtomicUsize::new(0);
+            let drawn = renderer.bounded_frame(&camera, &lighting, &done, limit).expect("can be read");
+            assert_eq!(done.into_inner(), renderer.tile_count());
+            drawn
+        };
+        let (first, frame, _) = draw(Duration::from_millis(1));
+        assert!(frame == expected, "{loading:?}");
+        let first = first.expect("time was limited");
+        assert!(first.stats.stand_ins > 0.1, "{:?}", first.stats);
+        assert!(first.frame.color != expected.color);
+        // A box is never farther than what is in it.
+        let depths = |frame: &Frame| frame.depth.clone().expect("asked for");
+        let pairs = depths(&first.frame).into_iter().zip(depths(&expected));
+        let farther = pairs.clone().filter(|(first, last)| *first > last * 1.001).count();
+        assert!(farther < 8, "{farther} pixels, which rays through their middle may miss");
+        assert!(pairs.filter(|(first, last)| *first < last * 0.999).count() > 500, "boxes are larger");
+
+        // Now that time is enough, nothing has to stand for anything.
+        let (first, frame, _) = draw(Duration::from_secs(3600));
+        let first = first.expect("time was limited");
+        assert!(first.frame == expected && frame == expected && first.stats.stand_ins == 0.0);
+        // Nor does an earlier deadline hold on.
+        assert!(renderer.frame(&camera, &lighting).0 == expected);
+    }
+    // A scene that is all in memory has no first picture.
+    let renderer = Renderer::new(&scene.resident, &scene.mesh, settings).expect("sensible");
+    let drawn = renderer.bounded_frame(&camera, &lighting, &AtomicUsize::new(0), Duration::from_millis(1));
+    let (first, frame, _) = drawn.expect("in memory");
+    assert!(first.is_none() && frame == expected);
+}
+
+#[test]
+fn a_ray_enters_the_first_page_before_it_hits() {
+    let mut small = shapes::soup(800, 4);
+    small.positions.iter_mut().for_each(|position| *position *= 1e-36);
+    for mesh in [shapes::soup(3000, 7), small] {
+        let scene = Scene::new(mesh);
+        let cached = scene.open(&CacheOptions::default(), 0, 1, scene.source());
+        let bounds = scene.resident.bounds();
+        let mut state = 0.0_f32;
+        let mut random = || {
+            state = (state + 0.618_034).fract();
+            state
+        };
+        let (mut hits, mut misses) = (0, 0);
+        for i in 0..4000 {
+            let mut point = |by: f32| {
+                let at = Vec3::new(random(), random(), random()) - 0.5;
+                bounds.center() + bounds.extent() * at * by
+            };
+            // From far outside, so that no ray begins in a page; some along an axis.
+            let (from, mut to) = (
+                bounds.center()
+                    + (point(1.0) - bounds.center()).normalize_or(Vec3::X)
+                        * bounds.extent().max_element()
+                        * 3.0,
+                point(1.2),
+            );
+            if i % 5 == 0 {
+                to = from;
+                to[i % 3] = bounds.center()[i % 3];
+            }
+            if from == to {
+                continue;
+            }
+            let ray = Ray::new(from, to - from);
+            let (hit, entry) = (scene.resident.intersect(&ray), crate::traverse::first_page(&cached, &ray));
+            if hit.is_hit() {
+                hits += 1;
+                let entry = entry.unwrap_or_else(|| panic!("{ray:?} hits at {}", hit.t));
+                assert!(entry.t <= hit.t * 1.00001 && entry.axis < 3, "{entry:?}, {}", hit.t);
+            } else if entry.is_none() {
+                misses += 1;
+            }
+        }
+        assert!(hits > 500 && misses > 20, "{hits} hits, {misses} misses");
+    }
+}

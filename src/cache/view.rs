@@ -170,8 +170,11 @@ impl<'a> View<'a> {
         }
         // Before they are let go of, so that the epoch protects them from then on.
         local.reader.enter();
-        drop(gathered);
         local.stalled(start.elapsed());
+        match gathered {
+            Ok(gathered) => drop(gathered),
+            Err(late) => panic::resume_unwind(Box::new(late)),
+        }
         if blocks.has_failed() {
             panic::resume_unwind(Box::new(Unreadable));
         }

@@ -11,9 +11,8 @@
 //! To see that a block is here is one load. A use writes only if the block was not used in this tick before.
 
 use super::policy::Use;
+use super::sync::{AtomicBool, AtomicU32, AtomicU64, Mutex, Ordering, PoisonError};
 use crossbeam::utils::CachePadded;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 const HERE: u32 = 1 << 31;
 const COUNT: u32 = 0x7f << 24;

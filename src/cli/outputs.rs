@@ -51,6 +51,13 @@ impl Outputs {
         Ok(())
     }
 
+    /// Writes the picture that a frame was at first, and returns its path.
+    pub fn write_first(&self, frame: &Frame, number: u32, frames: Option<u32>) -> Result<PathBuf> {
+        let output = first_path(&frame_path(&self.output, number, frames));
+        image::write_color(&output, frame.size, &frame.color)?;
+        Ok(output)
+    }
+
     /// Writes a frame's pictures and returns the main one's path.
     pub fn write(&self, frame: &Frame, number: u32, frames: Option<u32>) -> Result<PathBuf> {
         let path = |picture: &Path| frame_path(picture, number, frames);
@@ -80,6 +87,17 @@ fn frame_path(picture: &Path, number: u32, frames: Option<u32>) -> PathBuf {
     picture.with_file_name(name)
 }
 
+/// Where the picture goes that a frame was at first: `out.png` becomes `out.first.png`.
+fn first_path(picture: &Path) -> PathBuf {
+    let mut name = picture.file_stem().unwrap_or_default().to_os_string();
+    name.push(".first");
+    if let Some(ending) = picture.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    picture.with_file_name(name)
+}
+
 /// Whether two paths name one file, as far as can be known without creating it.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
@@ -96,5 +114,6 @@ mod tests {
         assert_eq!(path(0, Some(15)), Path::new("a/out.b_000.png"));
         assert_eq!(path(14, Some(15)), Path::new("a/out.b_014.png"));
         assert_eq!(path(7, Some(2000)), Path::new("a/out.b_0007.png"));
+        assert_eq!(first_path(&path(7, Some(8))), Path::new("a/out.b_007.first.png"));
     }
 }

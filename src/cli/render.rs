@@ -14,15 +14,16 @@ use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
-use crate::render::{RenderSettings, Renderer, Size, Tuning};
+use crate::render::{First, RenderSettings, Renderer, Size, Tuning};
 use crate::scene::{Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::store::{self, is_scene};
 use crate::study::heat::Cost;
 use crate::traverse::Kernel;
-use report::{Report, Shot};
+use report::{FirstShot, Report, Shot};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 use tracing::{debug, info};
 
 /// The size of pictures of models: square, as benchmarks have it.
@@ -91,6 +92,10 @@ pub struct Args {
         allow_negative_numbers = true
     )]
     step: f64,
+    /// With --memory on a .rpk: have a first picture within so many milliseconds, beside the frame's as
+    /// out.first.png, with boxes in place of what has not come from the file yet
+    #[arg(long, value_name = "MS", requires = "memory", conflicts_with = "heatmap")]
+    first_within: Option<u32>,
     #[command(flatten)]
     json: Json,
 }
@@ -108,6 +113,7 @@ pub fn run(args: &Args) -> Result<()> {
     let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
     args.outputs.check(args.orbit, &others)?;
     args.json.check()?;
+    let first_within = args.first_within()?;
     info!("profile {}, instruction set {isa}", args.build.name());
     debug!("{settings:?}");
 
@@ -126,9 +132,9 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let cameras: Vec<Camera> = orbit.map_or_else(|| vec![camera], |orbit| orbit.cameras(camera).collect());
     match &scene.looks {
-        Looks::Mesh(mesh) => args.render(&scene, mesh, settings, cameras),
-        Looks::Stored(stored) => args.render(&scene, stored, settings, cameras),
-        Looks::Cached(cached) => args.render(&scene, cached, settings, cameras),
+        Looks::Mesh(mesh) => args.render(&scene, mesh, settings, cameras, None),
+        Looks::Stored(stored) => args.render(&scene, stored, settings, cameras, None),
+        Looks::Cached(cached) => args.render(&scene, cached, settings, cameras, first_within),
     }
 }
 
@@ -169,6 +175,7 @@ impl Args {
         surface: &impl Surface,
         settings: RenderSettings,
         cameras: Vec<Camera>,
+        first_within: Option<Duration>,
     ) -> Result<()> {
         let lighting = scene.reading(|| self.lighting(&cameras[0], scene))?;
         let renderer = Renderer::new(&scene.accel, surface, settings)?;
@@ -178,10 +185,21 @@ impl Args {
         let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
         watch("rendering", fraction, || {
             for (number, camera) in (0..).zip(cameras) {
-                let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
+                let (first, frame, stats) = match first_within {
+                    None => {
+                        let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;
+                        (None, frame, stats)
+                    }
+                    Some(limit) => renderer.bounded_frame(&camera, &lighting, &tiles_done, limit)?,
+                };
+                let first = first.map(|First { frame, stats }| {
+                    let file = self.outputs.write_first(&frame, number, self.orbit)?;
+                    Ok::<_, Error>(FirstShot { file, stats })
+                });
+                let first = first.transpose()?;
                 let file = self.outputs.write(&frame, number, self.orbit)?;
                 debug!("frame {number} in {:.4} s", stats.seconds);
-                shots.push(Shot { file, camera, stats });
+                shots.push(Shot { file, camera, stats, first });
             }
             Ok::<(), Error>(())
         })?;
@@ -218,6 +236,19 @@ impl Args {
         };
         settings.check().map_err(as_option)?;
         Ok(settings)
+    }
+
+    /// When a first picture is to be there.
+    fn first_within(&self) -> Result<Option<Duration>> {
+        let Some(limit) = self.first_within else { return Ok(None) };
+        if !self.scene.as_deref().is_some_and(is_scene) {
+            let message = "only of a .rpk scene file some may have to come yet; leave it out";
+            return Err(Error::option("--first-within", message));
+        }
+        if limit == 0 {
+            return Err(Error::option("--first-within", "0 is no time; give at least 1"));
+        }
+        Ok(Some(Duration::from_millis(limit.into())))
     }
 
     fn orbit(&self) -> Result<Option<Orbit>> {

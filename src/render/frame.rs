@@ -18,6 +18,7 @@ pub struct Frame {
 
 /// A picture in the making: the tiles' pixels one tile after the other, so that each worker
 /// writes to memory of its own, and no two share a cache line but at a tile's ends.
+#[derive(Clone)]
 pub(super) struct TiledFrame {
     color: Vec<[f32; 3]>,
     depth: Option<Vec<f32>>,

@@ -5,6 +5,7 @@
 //! more than a handful of packets per worker. **The picture is the same, bit for bit, for every
 //! number of threads, tile size, packet width and instruction set.**
 
+mod bounded;
 mod frame;
 pub mod image;
 mod offset;
@@ -17,6 +18,7 @@ mod shade;
 mod stats;
 mod tile;
 
+pub use bounded::{First, FirstStats};
 pub use frame::Frame;
 pub use offset::offset_point;
 pub use order::{Tile, tiles};

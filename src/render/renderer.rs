@@ -1,5 +1,6 @@
 //! Cameras to frames.
 
+use super::bounded::{First, FirstStats, StandIn, StandInCost};
 use super::frame::{Frame, TilePixels, TiledFrame};
 use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
@@ -11,8 +12,9 @@ use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Makes pictures of one scene with one set of settings.
 #[derive(Debug)]
@@ -25,6 +27,25 @@ pub struct Renderer<'a, S = Mesh> {
     learnt: DispatchPool,
     /// Frames so far.
     frames: AtomicUsize,
+    /// What boxes cost in the frames before.
+    stand_in: StandInCost,
+}
+
+/// A frame that is to be drawn.
+struct Wanted<'a> {
+    camera: &'a Camera,
+    lighting: &'a Lighting,
+    /// Raised by one with each tile that is complete.
+    tiles_done: &'a AtomicUsize,
+    /// When a first picture is to be there.
+    limit: Option<Duration>,
+}
+
+/// A frame, and what was there before.
+struct Drawn {
+    first: Option<First>,
+    frame: Frame,
+    stats: FrameStats,
 }
 
 impl<'a, S: Surface> Renderer<'a, S> {
@@ -36,7 +57,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
         let learnt = DispatchPool::default();
-        Ok(Self { accel, surface, settings, tiles, learnt, frames: AtomicUsize::new(0) })
+        let (frames, stand_in) = (AtomicUsize::new(0), StandInCost::default());
+        Ok(Self { accel, surface, settings, tiles, learnt, frames, stand_in })
     }
 
     /// The settings.
@@ -64,76 +86,139 @@ impl<'a, S: Surface> Renderer<'a, S> {
         lighting: &Lighting,
         tiles_done: &AtomicUsize,
     ) -> Result<(Frame, FrameStats)> {
-        let frame = || self.frame_by_kernel(camera, lighting, tiles_done);
+        let wanted = Wanted { camera, lighting, tiles_done, limit: None };
+        self.drawn(&wanted).map(|drawn| (drawn.frame, drawn.stats))
+    }
+
+    /// The same in two steps: a first picture within `limit`, in which boxes stand for what has not come from
+    /// the file by then, and the frame, which is the same as without a limit. Of a scene that is all in memory,
+    /// nothing ever has to come, and there is no first picture.
+    ///
+    /// # Errors
+    /// As [`frame_with_progress`](Self::frame_with_progress).
+    pub fn bounded_frame(
+        &self,
+        camera: &Camera,
+        lighting: &Lighting,
+        tiles_done: &AtomicUsize,
+        limit: Duration,
+    ) -> Result<(Option<First>, Frame, FrameStats)> {
+        let wanted = Wanted { camera, lighting, tiles_done, limit: Some(limit) };
+        self.drawn(&wanted).map(|drawn| (drawn.first, drawn.frame, drawn.stats))
+    }
+
+    fn drawn(&self, wanted: &Wanted<'_>) -> Result<Drawn> {
         match self.accel.cached() {
-            Some(cached) => cached.or_error(frame),
-            None => Ok(frame()),
+            Some(cached) => {
+                let drawn = cached.or_error(|| self.drawn_by_kernel(wanted));
+                cached.set_deadline(None);
+                drawn
+            }
+            None => Ok(self.drawn_by_kernel(wanted)),
         }
     }
 
-    fn frame_by_kernel(
-        &self,
-        camera: &Camera,
-        lighting: &Lighting,
-        tiles_done: &AtomicUsize,
-    ) -> (Frame, FrameStats) {
+    fn drawn_by_kernel(&self, wanted: &Wanted<'_>) -> Drawn {
         match self.settings.tuning.packet {
-            Kernel::Single => self.frame_of(Calls::<1>::PACKETS, camera, lighting, tiles_done),
-            Kernel::Packet4 => self.frame_of(Calls::<4>::PACKETS, camera, lighting, tiles_done),
-            Kernel::Packet8 => self.frame_of(Calls::<8>::PACKETS, camera, lighting, tiles_done),
-            Kernel::Packet16 => self.frame_of(Calls::<16>::PACKETS, camera, lighting, tiles_done),
-            Kernel::Stream => self.frame_of(Calls::STREAM, camera, lighting, tiles_done),
-            Kernel::Tile => self.frame_of(Calls::TILES, camera, lighting, tiles_done),
+            Kernel::Single => self.drawn_with(Calls::<1>::PACKETS, wanted),
+            Kernel::Packet4 => self.drawn_with(Calls::<4>::PACKETS, wanted),
+            Kernel::Packet8 => self.drawn_with(Calls::<8>::PACKETS, wanted),
+            Kernel::Packet16 => self.drawn_with(Calls::<16>::PACKETS, wanted),
+            Kernel::Stream => self.drawn_with(Calls::STREAM, wanted),
+            Kernel::Tile => self.drawn_with(Calls::TILES, wanted),
         }
     }
 
-    fn frame_of<const W: usize>(
-        &self,
-        calls: Calls<W>,
-        camera: &Camera,
-        lighting: &Lighting,
-        tiles_done: &AtomicUsize,
-    ) -> (Frame, FrameStats)
+    fn drawn_with<const W: usize>(&self, calls: Calls<W>, wanted: &Wanted<'_>) -> Drawn
     where
         RayPacket<W>: PacketWidth<W>,
     {
         let start = Instant::now();
         let RenderSettings { size, samples, shadows, aovs, ref tuning } = self.settings;
         let threads = tuning.worker_count();
-        let workers = match self.accel.cached() {
-            None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
-            // Some wait for their blocks while others are at work. Tiles that are begun at about the same
-            // time are neighbours, so that they need the same blocks.
-            Some(cached) => Workers { threads: cached.workers(threads), pin: false, sharing: Sharing::Queue },
-        };
-        let task = TileTask {
+        let view = wanted.camera.view(size.width, size.height);
+        let mut task = TileTask {
             accel: self.accel,
             calls,
-            shader: Shader::new(self.surface, lighting, shadows),
-            view: camera.view(size.width, size.height),
+            shader: Shader::new(self.surface, wanted.lighting, shadows),
+            view,
             samples,
+            stand_in: None,
         };
+        let mut tiled = TiledFrame::new(size, aovs);
 
+        let mut outcome = Outcome::default();
+        let mut first = None;
         if let Some(cached) = self.accel.cached() {
             cached.begin_frame();
+            if let Some(limit) = wanted.limit {
+                cached.set_deadline(Some(self.stand_in.deadline(limit, size.pixels(), threads)));
+                task.stand_in = Some(StandIn { cached, view, cost: &self.stand_in });
+            }
         }
-        let mut tiled = TiledFrame::new(size, aovs);
-        let mut jobs = tiled.split(&self.tiles);
         // What the last frame has used last is there still: this one begins with it.
-        if self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some() {
+        let backwards = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some();
+        let mut jobs = tiled.split(&self.tiles);
+        if backwards {
             jobs.reverse();
         }
+        self.pass(&task, jobs, wanted, &mut outcome);
+
+        if let (Some(cached), Some(_)) = (self.accel.cached(), wanted.limit) {
+            let stand_ins: u64 = outcome.states.iter().map(|scratch| scratch.stand_ins).sum();
+            let frame = tiled.clone().assemble(size, &self.tiles);
+            let stand_ins = stand_ins as f64 / size.pixels() as f64;
+            let seconds = start.elapsed().as_secs_f64();
+            first = Some(First { frame, stats: FirstStats { seconds, stand_ins } });
+            cached.set_deadline(None);
+            task.stand_in = None;
+            let late: HashSet<(u32, u32)> =
+                outcome.states.iter().flat_map(|scratch| scratch.late.iter().copied()).collect();
+            let mut jobs = tiled.split(&self.tiles);
+            jobs.retain(|pixels| late.contains(&(pixels.tile.x, pixels.tile.y)));
+            if !jobs.is_empty() {
+                self.pass(&task, jobs, wanted, &mut outcome);
+            }
+        }
+        let frame = tiled.assemble(size, &self.tiles);
+        Drawn { first, frame, stats: self.stats(&outcome, threads, start.elapsed().as_secs_f64()) }
+    }
+
+    /// Renders some tiles.
+    fn pass<const W: usize>(
+        &self,
+        task: &TileTask<'_, S, W>,
+        jobs: Vec<TilePixels<'_>>,
+        wanted: &Wanted<'_>,
+        all: &mut Outcome<Scratch<W>>,
+    ) where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        let tuning = &self.settings.tuning;
+        let threads = tuning.worker_count();
+        let workers = match self.accel.cached() {
+            None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
+            // Some wait for their blocks while others are at work.
+            Some(cached) => {
+                // Where blocks have to go, tiles that are begun at about the same time are neighbours, so that they
+                // need the same ones. Where all have room, each worker has a part of the picture to itself, as
+                // in memory, and what is near it in its own caches.
+                let sharing = if cached.is_short() { Sharing::Queue } else { Sharing::Runs };
+                Workers { threads: cached.workers(threads), pin: false, sharing }
+            }
+        };
         let outcome = workers.run(
             jobs,
             || Scratch::<W>::new(self.learnt.take()),
             |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
-                task.render(scratch, pixels);
-                tiles_done.fetch_add(1, Ordering::Relaxed);
+                if task.render(scratch, pixels) {
+                    wanted.tiles_done.fetch_add(1, Ordering::Relaxed);
+                }
             },
         );
         outcome.states.iter().for_each(|scratch| self.learnt.put(scratch.dispatch));
-        let frame = tiled.assemble(size, &self.tiles);
-        (frame, self.stats(&outcome, threads, start.elapsed().as_secs_f64()))
+        all.states.extend(outcome.states);
+        all.pinned = outcome.pinned;
     }
 
     fn stats<const W: usize>(

@@ -34,6 +34,12 @@ pub struct Outcome<S> {
     pub pinned: usize,
 }
 
+impl<S> Default for Outcome<S> {
+    fn default() -> Self {
+        Self { states: Vec::new(), pinned: 0 }
+    }
+}
+
 impl Workers {
     /// Does every job once and returns when all are done.
     ///

@@ -1,12 +1,13 @@
 //! Rendering one tile: its pixels in small blocks, a packet to each.
 
+use super::bounded::StandIn;
 use super::frame::TilePixels;
 use super::order::Tile;
 use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
-use crate::scene::{Surface, View};
+use crate::scene::{Look, Surface, View};
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
 use glam::Vec3;
 use std::time::Instant;
@@ -14,7 +15,7 @@ use std::time::Instant;
 /// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
 /// that reading the clock between stages costs nothing, few enough that their rays and hits stay in the
 /// nearest caches.
-const SQUARE: u32 = 16;
+pub(super) const SQUARE: u32 = 16;
 
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
@@ -92,6 +93,8 @@ pub(super) struct TileTask<'a, S, const W: usize> {
     pub shader: Shader<'a, S>,
     pub view: View,
     pub samples: u32,
+    /// What is drawn where blocks do not come in time, if time is limited.
+    pub stand_in: Option<StandIn<'a>>,
 }
 
 /// One packet's pixels on their way through the stages.
@@ -123,6 +126,10 @@ pub(super) struct Scratch<const W: usize> {
     pub shadow: Tally,
     /// Seconds that each tile took, waiting included.
     pub tiles: Vec<f32>,
+    /// Tiles that are not complete: the places of their upper left pixels.
+    pub late: Vec<(u32, u32)>,
+    /// Pixels in them that something else stands for.
+    pub stand_ins: u64,
 }
 
 impl<const W: usize> Scratch<W> {
@@ -142,6 +149,8 @@ impl<const W: usize> Scratch<W> {
             camera: Tally::default(),
             shadow: Tally::default(),
             tiles: Vec::new(),
+            late: Vec::new(),
+            stand_ins: 0,
         }
     }
 }
@@ -178,23 +187,40 @@ impl<S: Surface, const W: usize> TileTask<'_, S, W>
 where
     RayPacket<W>: PacketWidth<W>,
 {
-    /// Renders a tile into its pixels.
-    pub fn render(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>) {
+    /// Renders a tile into its pixels; whether it is complete.
+    pub fn render(&self, scratch: &mut Scratch<W>, pixels: TilePixels<'_>) -> bool {
         let start = Instant::now();
         let mut pixels = pixels;
         let tile = pixels.tile;
+        let mut is_complete = true;
         for y in (0..tile.height).step_by(SQUARE as usize) {
             for x in (0..tile.width).step_by(SQUARE as usize) {
                 // A scene that is in memory in part gives its turns by squares.
                 let _session = self.accel.cached().map(|cached| cached.session());
-                let used = scratch.cover(&tile, x, y);
-                for sample in 0..self.samples {
-                    self.sample(scratch, used, sample, &mut pixels);
+                let Some(stand_in) = &self.stand_in else {
+                    self.square(scratch, &mut pixels, (x, y));
+                    continue;
+                };
+                if stand_in.cached.in_time(|| self.square(scratch, &mut pixels, (x, y))).is_none() {
+                    is_complete = false;
+                    stand_in.draw(&self.shader, scratch, &mut pixels, (x, y));
                 }
-                self.write(scratch, used, &mut pixels);
             }
         }
         scratch.tiles.push(start.elapsed().as_secs_f32());
+        if !is_complete {
+            scratch.late.push((tile.x, tile.y));
+        }
+        is_complete
+    }
+
+    /// Renders the square of a tile at a place in it.
+    fn square(&self, scratch: &mut Scratch<W>, pixels: &mut TilePixels<'_>, (x, y): (u32, u32)) {
+        let used = scratch.cover(&pixels.tile, x, y);
+        for sample in 0..self.samples {
+            self.sample(scratch, used, sample, pixels);
+        }
+        self.write(scratch, used, pixels);
     }
 
     /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
@@ -207,9 +233,11 @@ where
         scratch.camera.rays += count(active);
         scratch.camera.time += start.elapsed(self.accel);
 
+        let surfaces = self.shader.reader();
         for packet in 0..used {
-            self.shade(scratch, packet, sample == 0, pixels);
+            self.shade(scratch, &surfaces, packet, sample == 0, pixels);
         }
+        drop(surfaces);
 
         let start = Stopwatch::start(self.accel);
         let lit = &scratch.lit[..used];
@@ -238,12 +266,19 @@ where
 
     /// Shades a packet's hits and makes its shadow rays. The first sample also fills the depth and
     /// normal pictures.
-    fn shade(&self, scratch: &mut Scratch<W>, packet: usize, first: bool, pixels: &mut TilePixels<'_>) {
+    fn shade(
+        &self,
+        scratch: &mut Scratch<W>,
+        surfaces: &impl Look,
+        packet: usize,
+        first: bool,
+        pixels: &mut TilePixels<'_>,
+    ) {
         let block = &mut scratch.blocks[packet];
         let (rays, hits) = (&scratch.rays[packet], &scratch.hits[packet]);
         let mut lit = 0;
         for lane in lanes(scratch.active[packet]) {
-            let shade = self.shader.shade(&rays.get(lane), &hits.get(lane));
+            let shade = self.shader.shade(surfaces, &rays.get(lane), &hits.get(lane));
             block.sum[lane] += shade.base;
             if let Some(ray) = &shade.shadow {
                 scratch.shadows[packet].set(lane, ray);

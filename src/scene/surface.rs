@@ -12,14 +12,35 @@ use std::sync::Arc;
 /// Of one scene they say the same, to the bit, so that pictures are the same. All of them panic if a primitive is
 /// out of range.
 pub trait Surface: Sync {
+    /// What one thread looks at many of them with.
+    type Reader<'a>: Look
+    where
+        Self: 'a;
+
+    /// A reader, for a while in which this thread traces nothing.
+    fn reader(&self) -> Self::Reader<'_>;
     /// The three corners of a triangle, in the scene's coordinates.
     fn corners(&self, primitive: u32) -> [Vec3; 3];
     /// The linear RGB reflectance where a hit's barycentrics are `u` and `v`.
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3;
     /// The index of a triangle's material; 0 in scenes that have none.
     fn material(&self, primitive: u32) -> u32;
+}
 
-    /// Corners and reflectance at once.
+/// What shading looks at.
+pub trait Look {
+    /// A triangle's corners, and the reflectance where a hit's barycentrics are `u` and `v`: see [`Surface`].
+    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3);
+}
+
+impl Look for &Mesh {
+    #[inline(always)]
+    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
+        (self.corners(primitive), self.color(primitive, u, v))
+    }
+}
+
+impl Look for &Stored {
     #[inline(always)]
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
         (self.corners(primitive), self.color(primitive, u, v))
@@ -89,7 +110,30 @@ fn material_in(view: &View<'_>, primitive: u32) -> u32 {
     u32::from_le_bytes(view.color_bytes(primitive as usize * 4))
 }
 
+/// Surfaces that are not all in memory, through the eyes of one thread: it has its place among the readers once
+/// for all that it looks at.
+#[derive(Debug)]
+pub struct CachedReader<'a> {
+    surface: &'a CachedSurface,
+    view: View<'a>,
+}
+
+impl Look for CachedReader<'_> {
+    #[inline]
+    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
+        let Self { surface, view } = self;
+        (surface.corners_in(view, primitive), surface.color_in(view, primitive, u, v))
+    }
+}
+
 impl Surface for CachedSurface {
+    type Reader<'a> = CachedReader<'a>;
+
+    #[inline]
+    fn reader(&self) -> CachedReader<'_> {
+        CachedReader { surface: self, view: self.cached.view() }
+    }
+
     fn corners(&self, primitive: u32) -> [Vec3; 3] {
         self.corners_in(&self.cached.view(), primitive)
     }
@@ -104,15 +148,16 @@ impl Surface for CachedSurface {
             _ => 0,
         }
     }
-
-    #[inline]
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
-        let view = self.cached.view();
-        (self.corners_in(&view, primitive), self.color_in(&view, primitive, u, v))
-    }
 }
 
 impl Surface for Mesh {
+    type Reader<'a> = &'a Self;
+
+    #[inline(always)]
+    fn reader(&self) -> &Self {
+        self
+    }
+
     #[inline(always)]
     fn corners(&self, primitive: u32) -> [Vec3; 3] {
         self.corners(primitive)
@@ -130,6 +175,13 @@ impl Surface for Mesh {
 }
 
 impl Surface for Stored {
+    type Reader<'a> = &'a Self;
+
+    #[inline(always)]
+    fn reader(&self) -> &Self {
+        self
+    }
+
     #[inline(always)]
     fn corners(&self, primitive: u32) -> [Vec3; 3] {
         self.corners(primitive)

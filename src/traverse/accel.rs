@@ -146,10 +146,16 @@ impl Accel {
     /// Has a kernel called in the chosen mode, on the chosen instruction set.
     #[inline(always)]
     pub(super) fn ask<Q: Query>(&self, query: Q) -> Q::Output {
-        let tree = match &self.storage {
-            Storage::Resident(tree) => &**tree,
-            Storage::Cached(cached) => return self.ask_cached(cached, query),
-        };
+        match &self.storage {
+            Storage::Resident(_) => self.ask_resident(query),
+            Storage::Cached(cached) => self.ask_cached(cached, query),
+        }
+    }
+
+    /// The same for a scene that is all in memory. Panics if it is not.
+    #[inline(always)]
+    pub(super) fn ask_resident<Q: Query>(&self, query: Q) -> Q::Output {
+        let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
             Accuracy::Fast => {

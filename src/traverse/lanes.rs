@@ -108,6 +108,18 @@ impl<const W: usize> HitPacket<W> {
         }
     }
 
+    /// The first `N` hits.
+    pub(super) fn first<const N: usize>(&self) -> HitPacket<N> {
+        let row = |row: &[f32; W]| row.as_chunks::<N>().0[0];
+        HitPacket {
+            t: row(&self.t),
+            u: row(&self.u),
+            v: row(&self.v),
+            primitive: self.primitive.as_chunks::<N>().0[0],
+            normal: [row(&self.normal[0]), row(&self.normal[1]), row(&self.normal[2])],
+        }
+    }
+
     /// Puts `N` hits into the lanes from `part * N` on. Panics if there are not as many.
     #[inline(always)]
     pub(super) fn set_part<const N: usize>(&mut self, part: usize, hits: &HitPacket<N>) {

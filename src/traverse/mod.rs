@@ -11,6 +11,7 @@
 
 mod accel;
 mod closest;
+mod coarse;
 mod dispatch;
 mod kernel;
 mod lanes;
@@ -26,6 +27,7 @@ mod walk;
 mod width;
 
 pub use accel::Accel;
+pub use coarse::{Entry, first_page};
 pub use dispatch::{Dispatch, DispatchPool};
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, RayPacket};

@@ -25,24 +25,73 @@ pub trait PacketWidth<const W: usize> {
 }
 
 macro_rules! packet_width {
-    ($width:literal, $lanes:ty) => {
+    ($width:literal, $lanes:ty, $intersect:ident, $occluded:ident) => {
         impl PacketWidth<$width> for RayPacket<$width> {
             type Lanes<S: Simd> = $lanes;
 
             #[inline(never)]
             fn intersect(&self, accel: &Accel, active: u32) -> HitPacket<$width> {
-                accel.ask(IntersectPacket { rays: self, active })
+                $intersect(self, accel, active)
             }
 
             #[inline(never)]
             fn occluded(&self, accel: &Accel, active: u32) -> u32 {
-                accel.ask(OccludedPacket { rays: self, active })
+                $occluded(self, accel, active)
             }
         }
     };
 }
 
-packet_width!(1, f32);
-packet_width!(4, S::F4);
-packet_width!(8, S::F8);
-packet_width!(16, S::F16);
+packet_width!(1, f32, intersect_narrow, occluded_narrow);
+packet_width!(4, S::F4, intersect_narrow, occluded_narrow);
+packet_width!(8, S::F8, intersect, occluded);
+packet_width!(16, S::F16, intersect, occluded);
+
+#[inline(always)]
+fn intersect<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> HitPacket<W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    accel.ask(IntersectPacket { rays, active })
+}
+
+#[inline(always)]
+fn occluded<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> u32
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    accel.ask(OccludedPacket { rays, active })
+}
+
+/// The same for fewer rays than eight. In a scene that is in memory in part they go as eight: there, kernels
+/// of their own would be compiled for the sake of a few rays that wait for the disk.
+#[inline(always)]
+fn intersect_narrow<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> HitPacket<W>
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    if accel.cached().is_none() {
+        return accel.ask_resident(IntersectPacket { rays, active });
+    }
+    widened(rays).intersect(accel, active).first()
+}
+
+#[inline(always)]
+fn occluded_narrow<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> u32
+where
+    RayPacket<W>: PacketWidth<W>,
+{
+    if accel.cached().is_none() {
+        return accel.ask_resident(OccludedPacket { rays, active });
+    }
+    widened(rays).occluded(accel, active)
+}
+
+/// The rays as the first of eight.
+fn widened<const W: usize>(rays: &RayPacket<W>) -> RayPacket<8> {
+    let mut wide = RayPacket::empty();
+    for lane in 0..W {
+        wide.set(lane, &rays.get(lane));
+    }
+    wide
+}

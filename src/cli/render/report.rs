@@ -4,7 +4,7 @@ use crate::cli::cache_options::CacheReport;
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
 use crate::cli::scene::{Scene, SceneReport};
 use crate::geometry::Accuracy;
-use crate::render::{FrameStats, RayCount, RenderSettings, Size};
+use crate::render::{FirstStats, FrameStats, RayCount, RenderSettings, Size};
 use crate::scene::Camera;
 use crate::traverse::Kernel;
 use serde::Serialize;
@@ -21,6 +21,19 @@ pub struct Shot {
     /// What it cost.
     #[serde(flatten)]
     pub stats: FrameStats,
+    /// What there was before it was complete.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<FirstShot>,
+}
+
+/// A picture that was there before the frame was complete.
+#[derive(Debug, Serialize)]
+pub struct FirstShot {
+    /// Where it is.
+    pub file: PathBuf,
+    /// When, and how much of it.
+    #[serde(flatten)]
+    pub stats: FirstStats,
 }
 
 /// Everything there is to say.
@@ -123,12 +136,29 @@ impl<'a> Report<'a> {
             cache.describe(&mut lines);
         }
         lines.add("total", format!("{}, shading included", rays(&self.total)));
+        if let Some(words) = firsts(&self.frames) {
+            lines.add("first", words);
+        }
         let mut text = lines.text().to_owned();
         match &self.frames[..] {
             [still] => writeln!(text, "{:<10} {}", "wrote", still.file.display()).expect("into a string"),
             path => text.push_str(&frame_table(path)),
         }
         text
+    }
+}
+
+/// When first pictures were there, and what was missing in them.
+fn firsts(shots: &[Shot]) -> Option<String> {
+    let firsts: Vec<&FirstShot> = shots.iter().filter_map(|shot| shot.first.as_ref()).collect();
+    let greatest =
+        |of: fn(&FirstStats) -> f64| firsts.iter().map(|first| of(&first.stats)).fold(0.0, f64::max);
+    let (latest, stand_ins) = (greatest(|stats| stats.seconds), greatest(|stats| stats.stand_ins));
+    let boxes = format!("{:.1} % of the pixels drawn as boxes", stand_ins * 100.0);
+    match firsts[..] {
+        [] => None,
+        [first] => Some(format!("in {}, {boxes}: {}", duration(latest), first.file.display())),
+        _ => Some(format!("pictures in {} at most, {boxes} at most", duration(latest))),
     }
 }
 
