@@ -38,6 +38,7 @@
 //! | room | what is in it |
 //! |---|---|
 //! | [`mod@column`] | arrays that are owned, or lie in a mapped file |
+//! | [`mod@spool`] | lists that wait in files |
 //! | [`simd`] | vectors of 4, 8 and 16 floats, and the choice of an instruction set at run time |
 //! | [`geometry`] | ray, hit, box, the ray-triangle tests, clipping |
 //! | [`mesh`] | triangle meshes, readers of model files, generators |

@@ -17,7 +17,7 @@
 //!
 //! The fences forbid that (2) still sees the block and (5) does not yet see the reader.
 
-use super::sync::{Arc, AtomicU64, Mutex, Ordering, PoisonError, fence};
+use super::sync::{Arc, AtomicU64, AtomicUsize, Mutex, Ordering, PoisonError, fence};
 use crossbeam::utils::CachePadded;
 
 /// A slot's value while its reader is in no epoch: later than all.
@@ -28,6 +28,8 @@ const IDLE: u64 = u64::MAX;
 pub struct Epochs {
     now: CachePadded<AtomicU64>,
     slots: Box<[CachePadded<AtomicU64>]>,
+    /// Slots that have ever been a reader's: no others need be looked at.
+    used: AtomicUsize,
     free: Mutex<Vec<usize>>,
 }
 
@@ -37,6 +39,7 @@ impl Epochs {
         Arc::new(Self {
             now: CachePadded::new(AtomicU64::new(0)),
             slots: (0..readers).map(|_| CachePadded::new(AtomicU64::new(IDLE))).collect(),
+            used: AtomicUsize::new(0),
             free: Mutex::new((0..readers).rev().collect()),
         })
     }
@@ -44,6 +47,8 @@ impl Epochs {
     /// A new reader, in no epoch; `None` if there are as many as there may be.
     pub fn reader(self: &Arc<Self>) -> Option<Reader> {
         let slot = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop()?;
+        // Before it enters an epoch: who sees that sees this.
+        self.used.fetch_max(slot + 1, Ordering::SeqCst);
         Some(Reader { epochs: Arc::clone(self), slot })
     }
 
@@ -58,7 +63,8 @@ impl Epochs {
     pub fn earliest(&self) -> u64 {
         fence(Ordering::SeqCst);
         let now = self.now.load(Ordering::SeqCst);
-        self.slots.iter().map(|slot| slot.load(Ordering::SeqCst)).fold(now, u64::min)
+        let slots = &self.slots[..self.used.load(Ordering::SeqCst)];
+        slots.iter().map(|slot| slot.load(Ordering::SeqCst)).fold(now, u64::min)
     }
 }
 

@@ -7,6 +7,10 @@
 //! passes and costs quality; four passes over 32 bytes a triangle, three or four levels deep, are a small part
 //! of the work that the parts in memory take.)
 //!
+//! One rule of the builder in memory has no place here: there, a large node whose triangles have been cut into more
+//! than twice its share of references is built by one thread, so that the announced memory holds. Here it goes
+//! on being split from files, and below such a node the trees may differ.
+//!
 //! ```text
 //!        o            top: split from files, pass by pass (`list`), depth first
 //!       / \
