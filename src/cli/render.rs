@@ -164,7 +164,9 @@ impl Args {
         }
         let options = self.cache.options()?;
         let threads = settings.tuning.worker_count();
-        let beside = settings.frame_bytes() + options.loading.workers(threads) * BYTES_PER_WORKER;
+        // The picture that a frame was at first stays until the frame is complete.
+        let frames = 1 + usize::from(self.first_within.is_some());
+        let beside = frames * settings.frame_bytes() + options.loading.workers(threads) * BYTES_PER_WORKER;
         Scene::open_within(&store::File::open(path)?, &options, [memory, beside], threads, isa)
     }
 

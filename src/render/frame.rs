@@ -18,7 +18,6 @@ pub struct Frame {
 
 /// A picture in the making: the tiles' pixels one tile after the other, so that each worker
 /// writes to memory of its own, and no two share a cache line but at a tile's ends.
-#[derive(Clone)]
 pub(super) struct TiledFrame {
     color: Vec<[f32; 3]>,
     depth: Option<Vec<f32>>,
@@ -66,12 +65,12 @@ impl TiledFrame {
     }
 
     /// The same picture row by row. `tiles` must be those that it was split into.
-    pub fn assemble(self, size: Size, tiles: &[Tile]) -> Frame {
+    pub fn assemble(&self, size: Size, tiles: &[Tile]) -> Frame {
         Frame {
             size,
             color: in_rows(&self.color, size, tiles),
-            depth: self.depth.map(|depth| in_rows(&depth, size, tiles)),
-            normal: self.normal.map(|normal| in_rows(&normal, size, tiles)),
+            depth: self.depth.as_ref().map(|depth| in_rows(depth, size, tiles)),
+            normal: self.normal.as_ref().map(|normal| in_rows(normal, size, tiles)),
         }
     }
 }

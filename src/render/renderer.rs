@@ -166,7 +166,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
 
         if let (Some(cached), Some(_)) = (self.accel.cached(), wanted.limit) {
             let stand_ins: u64 = outcome.states.iter().map(|scratch| scratch.stand_ins).sum();
-            let frame = tiled.clone().assemble(size, &self.tiles);
+            let frame = tiled.assemble(size, &self.tiles);
             let stand_ins = stand_ins as f64 / size.pixels() as f64;
             let seconds = start.elapsed().as_secs_f64();
             first = Some(First { frame, stats: FirstStats { seconds, stand_ins } });

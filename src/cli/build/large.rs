@@ -6,6 +6,7 @@ use super::super::report::{bytes, duration};
 use super::super::scene::BuildMemory;
 use super::{Args, ModelReport};
 use crate::error::{Error, Result};
+use crate::files::folder_of;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::spooled;
 use crate::store::Written;
@@ -51,11 +52,9 @@ pub fn is_called_for(
 pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
     let path = &args.models[0];
     let name = path.display().to_string();
-    let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
     let start = Instant::now();
     let bar = Bar::new("reading");
-    let (mesh, report) =
-        spooled::read(path, folder.unwrap_or(Path::new(".")), &|part| bar.set(f64::from(part)))?;
+    let (mesh, mut report) = spooled::read(path, folder_of(&args.output), &|part| bar.set(f64::from(part)))?;
     drop(bar);
     let read_seconds = start.elapsed().as_secs_f64();
     info!("read {name} in {}, to files", duration(read_seconds));
@@ -75,7 +74,6 @@ pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
     let work = || large::build(&args.output, &mesh, params, limit - PROCESS, &name, &progress);
     let built = watch("building", || progress.fraction(), work)?;
     let seconds = start.elapsed().as_secs_f64();
-    let mut report = report;
     report.zero_area_triangles = built.zero_area_triangles;
     Ok(Large {
         model: ModelReport {

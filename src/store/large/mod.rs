@@ -3,10 +3,10 @@
 //! The mesh's sections and its triangles' records go into the scene file first. From there the tree's builder
 //! ([`crate::kdtree::outer`]) reads the records; its arrays grow in files beside, and become sections when all
 //! of the tree is known. What the file holds is, section by section, what the other way writes, but for the
-//! order of the sections and for the last digits of some figures in `meta`.
+//! order of the sections and for `build_peak` in `meta`.
 //!
-//! Beside the scene file there is room needed for the arrays (some 36 bytes a triangle) and for references (32
-//! bytes a triangle, and half as much again), both of which vanish, whatever happens.
+//! Beside the scene file there is room needed for the mesh in files, for the arrays (some 36 bytes a triangle) and
+//! for references (32 bytes each), all of which vanish, whatever happens.
 
 mod arrays;
 mod shelf;
@@ -18,7 +18,7 @@ use super::out::Out;
 use super::section::Kind;
 use super::writer::Written;
 use crate::error::{Error, Result};
-use crate::files::write_or;
+use crate::files::{folder_of, write_or};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::outer::{self, Array, Job, Outline, Triangles};
@@ -96,7 +96,7 @@ pub fn build(
     progress: &Progress,
 ) -> Result<Built> {
     params.check()?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     let cannot = |source: io::Error| Error::Write { path: path.into(), source };
     write_or(path, |file| {
         let mut out = Out::new(file, &|_| ()).map_err(cannot)?;
