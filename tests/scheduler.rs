@@ -77,7 +77,7 @@ fn so_does_the_inside_of_a_room_with_vertex_colors() {
         .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
         .collect();
     let colors = (0..16u8).map(|i| [i * 16, 255 - i * 9, 77 + i * 3]).collect();
-    let mesh = Mesh { positions, triangles, colors: Colors::PerVertex(colors) };
+    let mesh = Mesh { positions, triangles, colors: Colors::PerVertex(colors), ..Mesh::default() };
     let camera = Camera { fov: 70.0, ..Camera::new(Vec3::new(0.9, 0.8, 1.7), Vec3::new(0.0, -1.0, -1.0)) };
     let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
     assert!(matches!(Lighting::for_view(&camera, &accel).key, Light::Point { .. }));

@@ -305,7 +305,7 @@ fn colors_of_all_kinds_come_from_files_as_they_were() {
     let mut mesh = shapes::soup(3000, 9);
     let byte = |i: usize, k: usize| (i * k % 251) as u8;
     let rgb = |i: usize| [byte(i, 7), byte(i, 31), byte(i, 101)];
-    let material = |i: usize| Material { name: format!("m{i}"), diffuse: Vec3::splat(0.1 + 0.2 * i as f32) };
+    let material = |i: usize| Material::matt(format!("m{i}"), Vec3::splat(0.1 + 0.2 * i as f32));
     let count = mesh.triangles.len();
     for colors in [
         Colors::Uniform(Vec3::new(0.2, 0.5, 0.7)),

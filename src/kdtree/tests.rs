@@ -29,7 +29,7 @@ impl Numbers {
 fn mesh_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
     let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
     let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    Mesh { positions, triangles, colors: Colors::default() }
+    Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
 }
 
 fn soup(count: usize, size: f32, seed: u64) -> Mesh {

@@ -153,6 +153,7 @@ mod tests {
             positions: points(&[0.0, 1.0, 2.0, 3.0]),
             triangles: vec![[0, 0, 1], [0, 1, 2], [1, 2, 1], [1, 2, 3]],
             colors: Colors::PerTriangle(vec![[1; 3], [2; 3], [3; 3], [4; 3]]),
+            ..Mesh::default()
         };
         let (mesh, report) = checked(mesh).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [1, 2, 3]]);
@@ -166,6 +167,7 @@ mod tests {
             positions: points(&[f32::NAN, 0.0, 9.0, 1.0, 2.0]),
             triangles: vec![[1, 3, 4]],
             colors: Colors::PerVertex(vec![[0; 3], [1; 3], [2; 3], [3; 3], [4; 3]]),
+            ..Mesh::default()
         };
         let (mesh, report) = checked(mesh).unwrap();
         assert_eq!(mesh.positions, points(&[0.0, 1.0, 2.0]));
@@ -180,6 +182,7 @@ mod tests {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::INFINITY, 0.0), Vec3::NAN],
             triangles: vec![[0, 1, 2], [0, 1, 3]],
             colors: Colors::default(),
+            ..Mesh::default()
         };
         assert_eq!(checked(mesh).unwrap_err(), Unusable::NonFinite(NonFinite { first: 2, count: 2 }));
     }
@@ -190,6 +193,7 @@ mod tests {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0, Vec3::Y * 1e-30],
             triangles: vec![[0, 1, 2], [0, 1, 3]],
             colors: Colors::default(),
+            ..Mesh::default()
         };
         let (mesh, report) = checked(mesh).unwrap();
         assert_eq!((mesh.triangles.len(), report.zero_area_triangles), (2, 1));
@@ -197,8 +201,12 @@ mod tests {
 
     #[test]
     fn nothing_left_is_an_error() {
-        let mesh =
-            Mesh { positions: points(&[0.0, 1.0]), triangles: vec![[0, 1, 1]], colors: Colors::default() };
+        let mesh = Mesh {
+            positions: points(&[0.0, 1.0]),
+            triangles: vec![[0, 1, 1]],
+            colors: Colors::default(),
+            ..Mesh::default()
+        };
         assert_eq!(checked(mesh).unwrap_err(), Unusable::NoTriangles);
     }
 }

@@ -1,5 +1,6 @@
 //! Surface colours, and the sRGB transfer function between bytes and light.
 
+use super::material::{DEFAULT_DIFFUSE, Material};
 use glam::Vec3;
 use std::sync::LazyLock;
 
@@ -21,21 +22,9 @@ pub enum Colors {
     },
 }
 
-/// A surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// Its name in the file.
-    pub name: String,
-    /// Diffuse reflectance, linear RGB.
-    pub diffuse: Vec3,
-}
-
-/// The reflectance of what no file gives a colour.
-pub(super) const DEFAULT: Vec3 = Vec3::splat(0.7);
-
 impl Default for Colors {
     fn default() -> Self {
-        Self::Uniform(DEFAULT)
+        Self::Uniform(DEFAULT_DIFFUSE)
     }
 }
 
@@ -46,7 +35,7 @@ impl Colors {
             Self::Uniform(_) => 0,
             Self::PerTriangle(colors) | Self::PerVertex(colors) => colors.capacity() * 3,
             Self::PerMaterial { materials, of_triangle } => {
-                let names: usize = materials.iter().map(|m| m.name.capacity()).sum();
+                let names: usize = materials.iter().map(|m| m.name.capacity() + m.place.capacity()).sum();
                 of_triangle.capacity() * 4 + materials.capacity() * size_of::<Material>() + names
             }
         }

@@ -79,7 +79,7 @@ fn unify(meshes: &mut [Mesh]) {
 
 /// Makes colours that are not by vertex materials, a material for each colour.
 fn to_materials(mesh: &mut Mesh) {
-    let unnamed = |diffuse| Material { name: String::new(), diffuse };
+    let unnamed = |diffuse| Material::matt("", diffuse);
     let (materials, of_triangle) = match &mesh.colors {
         Colors::Uniform(color) => (vec![unnamed(*color)], vec![0; mesh.triangles.len()]),
         Colors::PerTriangle(colors) => {
@@ -89,7 +89,7 @@ fn to_materials(mesh: &mut Mesh) {
                 *numbers.entry(*color).or_insert_with(|| {
                     let [r, g, b] = color;
                     let name = format!("#{r:02x}{g:02x}{b:02x}");
-                    materials.push(Material { name, diffuse: decode(*color) });
+                    materials.push(Material::matt(name, decode(*color)));
                     materials.len() as u32 - 1
                 })
             };
@@ -139,11 +139,12 @@ mod tests {
             positions: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             colors,
+            ..Mesh::default()
         }
     }
 
     fn named(name: &str, diffuse: Vec3) -> Material {
-        Material { name: name.into(), diffuse }
+        Material::matt(name, diffuse)
     }
 
     fn kinds() -> [Colors; 4] {

@@ -3,20 +3,24 @@
 //! [`read()`] turns an OBJ or PLY file into a checked [`Mesh`] and says what it dropped or
 //! repaired; [`generate`] makes models of any size; [`ply::write`] saves one.
 
+mod attributes;
 mod check;
 mod color;
 pub mod generate;
 mod join;
 mod lists;
+mod material;
 pub mod obj;
 pub mod ply;
 mod read;
 mod shape;
 pub mod spooled;
 
+pub use attributes::{Attributes, Normal};
 pub use check::MAX_TRIANGLES;
-pub use color::{Colors, Material, linear_to_srgb, srgb_to_linear};
+pub use color::{Colors, linear_to_srgb, srgb_to_linear};
 pub(crate) use color::{blend, decode};
+pub use material::{Channel, Image, ImageSource, Map, Maps, Material};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
 pub use shape::{DECADES, Shapes};
 
@@ -34,6 +38,10 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// What colour the triangles have.
     pub colors: Colors,
+    /// Texture coordinates and normals by triangle; empty if the model has none.
+    pub attributes: Vec<Attributes>,
+    /// The pictures that materials' maps name.
+    pub images: Vec<Image>,
 }
 
 impl Mesh {
@@ -77,6 +85,8 @@ impl Mesh {
         self.positions.capacity() * size_of::<Vec3>()
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.colors.bytes()
+            + self.attributes.capacity() * size_of::<Attributes>()
+            + self.images.iter().map(Image::bytes).sum::<usize>()
     }
 }
 
@@ -85,7 +95,8 @@ mod tests {
     use super::*;
 
     fn triangle(colors: Colors) -> Mesh {
-        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], colors }
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        Mesh { positions, triangles: vec![[0, 1, 2]], colors, ..Mesh::default() }
     }
 
     #[test]
@@ -106,8 +117,8 @@ mod tests {
 
     #[test]
     fn materials_are_looked_up_by_triangle() {
-        let red = Material { name: "red".into(), diffuse: Vec3::X };
-        let blue = Material { name: "blue".into(), diffuse: Vec3::Z };
+        let red = Material::matt("red", Vec3::X);
+        let blue = Material::matt("blue", Vec3::Z);
         let mesh = triangle(Colors::PerMaterial { materials: vec![red, blue.clone()], of_triangle: vec![1] });
         assert_eq!(mesh.color(0, 0.1, 0.2), blue.diffuse);
     }

@@ -73,7 +73,7 @@ mod tests {
             Vec3::new(5.0, 0.0, 0.0),
         ];
         let triangles = vec![[0, 1, 2], [0, 1, 3], [0, 4, 1], [2, 2, 1]];
-        let shapes = Shapes::of(&Mesh { positions, triangles, colors: Colors::default() });
+        let shapes = Shapes::of(&Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() });
         assert_eq!(shapes.largest_area, 50.0);
         // 0.25 is 200 times less; 10 long, 0.05 high.
         assert_eq!(shapes.by_area, [1, 0, 1, 0, 0, 0, 0, 0, 0]);

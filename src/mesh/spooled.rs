@@ -83,7 +83,12 @@ impl SpooledMesh {
                 Colors::PerMaterial { materials: materials.clone(), of_triangle: of_triangle.to_vec()? }
             }
         };
-        Ok(Mesh { positions: self.positions.to_vec()?, triangles: self.triangles.to_vec()?, colors })
+        Ok(Mesh {
+            positions: self.positions.to_vec()?,
+            triangles: self.triangles.to_vec()?,
+            colors,
+            ..Mesh::default()
+        })
     }
 }
 

@@ -53,7 +53,7 @@ mod tests {
     use crate::traverse::Accel;
 
     fn accel(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> (Accel, Mesh) {
-        let mesh = Mesh { positions, triangles, colors: Colors::default() };
+        let mesh = Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() };
         (Accel::build(&mesh, &BuildParams::default()).expect("builds"), mesh)
     }
 

@@ -214,7 +214,7 @@ mod tests {
             triangles.extend(quads(&[[2, 3, 7, 6]]));
         }
         let positions = room_corners(if open { 0.2 } else { 2.0 });
-        let mesh = Mesh { positions, triangles, colors: Colors::default() };
+        let mesh = Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() };
         Accel::build(&mesh, &BuildParams::default()).expect("builds")
     }
 
@@ -255,6 +255,7 @@ mod tests {
             positions: room_corners(2.0),
             triangles: quads(&[[0, 1, 3, 2], [0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6]]),
             colors: Colors::default(),
+            ..Mesh::default()
         };
         let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
         let camera = Camera { fov: 35.0, ..Camera::new(Vec3::Z * 4.0, Vec3::ZERO) };

@@ -14,5 +14,5 @@ mod view;
 pub use camera::{Camera, DEFAULT_FOV};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use path::Orbit;
-pub use surface::{CachedReader, CachedSurface, Look, Surface};
+pub use surface::{CachedReader, CachedSurface, Detail, Look, Surface};
 pub use view::View;

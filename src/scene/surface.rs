@@ -2,7 +2,7 @@
 
 use crate::cache::{Cached, View};
 use crate::kdtree::Tree;
-use crate::mesh::{Mesh, blend, decode};
+use crate::mesh::{Attributes, Colors, Image, Material, Mesh, blend, decode};
 use crate::store::{self, ColorMeta, Stored};
 use glam::Vec3;
 use std::sync::Arc;
@@ -25,12 +25,33 @@ pub trait Surface: Sync {
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3;
     /// The index of a triangle's material; 0 in scenes that have none.
     fn material(&self, primitive: u32) -> u32;
+    /// The materials; empty in scenes that have none, whose surfaces are matt.
+    fn materials(&self) -> &[Material];
+    /// The pictures that materials' maps name.
+    fn images(&self) -> &[Image];
+    /// Whether any triangle has texture coordinates or normals.
+    fn has_attributes(&self) -> bool;
 }
 
 /// What shading looks at.
 pub trait Look {
     /// A triangle's corners, and the reflectance where a hit's barycentrics are `u` and `v`: see [`Surface`].
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3);
+    /// All that there is to know about a triangle.
+    fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail;
+}
+
+/// A triangle, for shading that does more than matt surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detail {
+    /// Its corners, in the scene's coordinates.
+    pub corners: [Vec3; 3],
+    /// Its linear RGB reflectance where it was hit, maps left out.
+    pub color: Vec3,
+    /// The index of its material; 0 in scenes that have none.
+    pub material: u32,
+    /// What its corners have; [`Attributes::NONE`] in scenes that have none.
+    pub attributes: Attributes,
 }
 
 impl Look for &Mesh {
@@ -38,12 +59,32 @@ impl Look for &Mesh {
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
         (self.corners(primitive), self.color(primitive, u, v))
     }
+
+    #[inline]
+    fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
+        Detail {
+            corners: self.corners(primitive),
+            color: self.color(primitive, u, v),
+            material: self.material(primitive),
+            attributes: self.attributes.get(primitive as usize).copied().unwrap_or(Attributes::NONE),
+        }
+    }
 }
 
 impl Look for &Stored {
     #[inline(always)]
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
         (self.corners(primitive), self.color(primitive, u, v))
+    }
+
+    #[inline]
+    fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
+        Detail {
+            corners: self.corners(primitive),
+            color: self.color(primitive, u, v),
+            material: self.material(primitive),
+            attributes: Attributes::NONE,
+        }
     }
 }
 
@@ -75,7 +116,7 @@ impl CachedSurface {
             ColorMeta::PerTriangle => CachedPaint::PerTriangle,
             ColorMeta::PerVertex => CachedPaint::PerCorner,
             ColorMeta::PerMaterial { materials } => {
-                CachedPaint::PerMaterial(materials.iter().map(|material| material.diffuse.into()).collect())
+                CachedPaint::PerMaterial(materials.iter().map(|material| material.diffuse).collect())
             }
         };
         Self { cached, paint }
@@ -124,6 +165,16 @@ impl Look for CachedReader<'_> {
         let Self { surface, view } = self;
         (surface.corners_in(view, primitive), surface.color_in(view, primitive, u, v))
     }
+
+    #[inline]
+    fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
+        let (corners, color) = self.look(primitive, u, v);
+        let material = match &self.surface.paint {
+            CachedPaint::PerMaterial(_) => material_in(&self.view, primitive),
+            _ => 0,
+        };
+        Detail { corners, color, material, attributes: Attributes::NONE }
+    }
 }
 
 impl Surface for CachedSurface {
@@ -147,6 +198,18 @@ impl Surface for CachedSurface {
             CachedPaint::PerMaterial(_) => material_in(&self.cached.view(), primitive),
             _ => 0,
         }
+    }
+
+    fn materials(&self) -> &[Material] {
+        &[]
+    }
+
+    fn images(&self) -> &[Image] {
+        &[]
+    }
+
+    fn has_attributes(&self) -> bool {
+        false
     }
 }
 
@@ -172,6 +235,21 @@ impl Surface for Mesh {
     fn material(&self, primitive: u32) -> u32 {
         self.material(primitive)
     }
+
+    fn materials(&self) -> &[Material] {
+        match &self.colors {
+            Colors::PerMaterial { materials, .. } => materials,
+            _ => &[],
+        }
+    }
+
+    fn images(&self) -> &[Image] {
+        &self.images
+    }
+
+    fn has_attributes(&self) -> bool {
+        !self.attributes.is_empty()
+    }
 }
 
 impl Surface for Stored {
@@ -195,5 +273,17 @@ impl Surface for Stored {
     #[inline(always)]
     fn material(&self, primitive: u32) -> u32 {
         self.material(primitive)
+    }
+
+    fn materials(&self) -> &[Material] {
+        &[]
+    }
+
+    fn images(&self) -> &[Image] {
+        &[]
+    }
+
+    fn has_attributes(&self) -> bool {
+        false
     }
 }

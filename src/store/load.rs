@@ -6,7 +6,7 @@ use super::section::Kind;
 use crate::column::Column;
 use crate::error::{Error, Result};
 use crate::kdtree::{KdTree, Node, Parts};
-use crate::mesh::{Colors, Material, Mesh};
+use crate::mesh::{Colors, Mesh};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -83,14 +83,10 @@ impl File {
             ColorMeta::PerVertex => Colors::PerVertex(self.column(Kind::VertexColors).to_vec()),
             ColorMeta::PerMaterial { materials } => {
                 let of_triangle = self.material_of_triangle(materials.len())?.to_vec();
-                let material = |material: &super::MaterialMeta| Material {
-                    name: material.name.clone(),
-                    diffuse: material.diffuse.into(),
-                };
-                Colors::PerMaterial { materials: materials.iter().map(material).collect(), of_triangle }
+                Colors::PerMaterial { materials: materials.clone(), of_triangle }
             }
         };
-        Ok(Mesh { positions: positions.to_vec(), triangles: triangles.to_vec(), colors })
+        Ok(Mesh { positions: positions.to_vec(), triangles: triangles.to_vec(), colors, ..Mesh::default() })
     }
 
     /// Each triangle's material, of so many that there are. Its checksums must have been checked.

@@ -56,18 +56,8 @@ pub enum ColorMeta {
     /// These, and the section `material-of-triangle`.
     PerMaterial {
         /// The materials.
-        materials: Vec<MaterialMeta>,
+        materials: Vec<Material>,
     },
-}
-
-/// A material.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MaterialMeta {
-    /// Its name in the model.
-    pub name: String,
-    /// Diffuse reflectance, linear RGB.
-    pub diffuse: [f32; 3],
 }
 
 impl Meta {
@@ -105,7 +95,7 @@ impl Meta {
             ColorMeta::Uniform { color } => reflects(color),
             ColorMeta::PerTriangle | ColorMeta::PerVertex => true,
             ColorMeta::PerMaterial { materials } => {
-                !materials.is_empty() && materials.iter().all(|material| reflects(&material.diffuse))
+                !materials.is_empty() && materials.iter().all(|material| material.fault().is_none())
             }
         };
         if !has_colors {
@@ -135,15 +125,7 @@ impl ColorMeta {
             Colors::Uniform(color) => Self::Uniform { color: color.to_array() },
             Colors::PerTriangle(_) => Self::PerTriangle,
             Colors::PerVertex(_) => Self::PerVertex,
-            Colors::PerMaterial { materials, .. } => {
-                Self::PerMaterial { materials: materials.iter().map(MaterialMeta::of).collect() }
-            }
+            Colors::PerMaterial { materials, .. } => Self::PerMaterial { materials: materials.clone() },
         }
-    }
-}
-
-impl MaterialMeta {
-    pub(super) fn of(material: &Material) -> Self {
-        Self { name: material.name.clone(), diffuse: material.diffuse.to_array() }
     }
 }

@@ -31,7 +31,7 @@ mod writer;
 
 pub use checksum::{BLOCK, of_block as block_checksum};
 pub use header::VERSION;
-pub use meta::{ColorMeta, MaterialMeta, Meta};
+pub use meta::{ColorMeta, Meta};
 pub use reader::File;
 pub use section::{Kind, Section};
 pub use stored::{Paint, Stored};

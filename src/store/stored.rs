@@ -75,7 +75,7 @@ impl File {
             ColorMeta::PerTriangle => Paint::PerTriangle(self.column(Kind::TriangleColors)),
             ColorMeta::PerVertex => Paint::PerCorner(self.column(Kind::CornerColors)),
             ColorMeta::PerMaterial { materials } => Paint::PerMaterial {
-                diffuse: materials.iter().map(|material| material.diffuse.into()).collect(),
+                diffuse: materials.iter().map(|material| material.diffuse).collect(),
                 of_triangle: self.material_of_triangle(materials.len())?,
             },
         })

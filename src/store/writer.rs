@@ -96,7 +96,7 @@ fn check(mesh: &Mesh, tree: &KdTree) -> Result<()> {
         Colors::PerMaterial { materials, of_triangle } => {
             of_triangle.len() == triangles
                 && of_triangle.iter().all(|&material| (material as usize) < materials.len())
-                && materials.iter().all(|material| material.diffuse.is_finite())
+                && materials.iter().all(|material| material.fault().is_none())
         }
     };
     if !belongs {

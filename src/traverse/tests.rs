@@ -10,7 +10,12 @@ use glam::Vec3;
 /// A unit square in the plane z = 0, as two triangles.
 fn square() -> Accel {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y];
-    let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], colors: Colors::default() };
+    let mesh = Mesh {
+        positions,
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        colors: Colors::default(),
+        ..Mesh::default()
+    };
     Accel::build(&mesh, &BuildParams::default()).expect("builds")
 }
 
@@ -108,6 +113,7 @@ fn powers_of_two_change_nothing_but_exponents() {
             positions: positions.collect(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             colors: Colors::default(),
+            ..Mesh::default()
         };
         let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
         assert_eq!(accel.bounds().max, Vec3::new(place, place, 0.0));

@@ -111,6 +111,7 @@ fn of_coincident_triangles_the_lowest_id_wins() {
                 positions: corners.into(),
                 triangles: vec![[0, 1, 2]; copies],
                 colors: Colors::default(),
+                ..Mesh::default()
             };
             let rays: Vec<Ray> = (0..500)
                 .map(|_| {

@@ -37,7 +37,7 @@ impl Closed {
 pub fn of_triangles(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
     let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
     let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    Mesh { positions, triangles, colors: Colors::default() }
+    Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
 }
 
 /// Several meshes in one, ids in their order.

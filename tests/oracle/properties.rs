@@ -20,7 +20,7 @@ fn mesh(grid: bool) -> impl Strategy<Value = Mesh> {
     prop::collection::vec([point(grid), point(grid), point(grid)], 1..60).prop_map(|triangles| {
         let positions: Vec<Vec3> = triangles.into_iter().flatten().collect();
         let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        Mesh { positions, triangles, colors: Colors::default() }
+        Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
     })
 }
 

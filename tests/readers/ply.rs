@@ -269,7 +269,7 @@ fn bytes_after_the_end_are_counted() {
 
 fn colored(colors: Colors) -> Mesh {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1e-40, -0.0, f32::MAX)];
-    Mesh { positions, triangles: vec![[0, 1, 2], [3, 2, 1]], colors }
+    Mesh { positions, triangles: vec![[0, 1, 2], [3, 2, 1]], colors, ..Mesh::default() }
 }
 
 #[test]
@@ -286,7 +286,7 @@ fn what_is_written_is_read_again() {
         assert_eq!(loaded.mesh, mesh);
         assert_eq!(loaded.report.summary(), "");
     }
-    let materials = [Vec3::X, Vec3::Y].map(|diffuse| mesh::Material { name: "m".into(), diffuse });
+    let materials = [Vec3::X, Vec3::Y].map(|diffuse| mesh::Material::matt("m", diffuse));
     let mesh = colored(Colors::PerMaterial { materials: materials.into(), of_triangle: vec![1, 0] });
     ply::write(&path, &mesh).unwrap();
     let colors = mesh::read(&path).unwrap().mesh.colors;

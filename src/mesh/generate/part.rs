@@ -71,6 +71,7 @@ impl Whole {
             positions: self.positions,
             triangles: self.triangles,
             colors: Colors::PerMaterial { materials, of_triangle: self.of_triangle },
+            ..Mesh::default()
         }
     }
 }

@@ -71,7 +71,7 @@ pub fn sphere(subdivisions: u32) -> Mesh {
             })
             .collect();
     }
-    Mesh { positions, triangles, colors: Colors::default() }
+    Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
 }
 
 /// A gently rolling height field over the unit square, of 2 n² triangles.
@@ -92,7 +92,7 @@ pub fn grid(n: usize) -> Mesh {
             triangles.extend([[a, c, b], [b, c, d]]);
         }
     }
-    Mesh { positions, triangles, colors: Colors::default() }
+    Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
 }
 
 /// `n` times the same triangle: no plane separates them, every hit is a tie.
@@ -101,6 +101,7 @@ pub fn coincident(n: usize) -> Mesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
         triangles: vec![[0, 1, 2]; n],
         colors: Colors::default(),
+        ..Mesh::default()
     }
 }
 
@@ -133,7 +134,7 @@ fn point(rng: &mut Rng) -> Vec3 {
 fn scattered(n: usize, triangle: impl FnMut() -> [Vec3; 3]) -> Mesh {
     let positions: Vec<Vec3> = std::iter::repeat_with(triangle).take(n).flatten().collect();
     let triangles = (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    Mesh { positions, triangles, colors: Colors::default() }
+    Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() }
 }
 
 /// Squares between points of the integer lattice, with shared vertices.

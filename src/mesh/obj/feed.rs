@@ -2,7 +2,7 @@
 
 use super::mtl::Library;
 use crate::mesh::ReadReport;
-use crate::mesh::color;
+use crate::mesh::{color, material};
 use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 
@@ -180,7 +180,7 @@ impl<'a> Feed<'a> {
             self.out.extend_from_slice(number);
         }
         if self.all_colored && kept == 3 {
-            let grey = f32::from(color::linear_to_srgb(color::DEFAULT.x)) / 255.0;
+            let grey = f32::from(color::linear_to_srgb(material::DEFAULT_DIFFUSE.x)) / 255.0;
             self.out.extend_from_slice(format!(" {grey} {grey} {grey}").as_bytes());
         }
         self.out.push(b'\n');

@@ -15,7 +15,8 @@
 mod feed;
 mod mtl;
 
-use super::color::{self, Colors, Material};
+use super::color::{self, Colors};
+use super::material::{self, Material};
 use super::{Mesh, ReadReport};
 use feed::Feed;
 use glam::Vec3;
@@ -95,7 +96,7 @@ fn merge(models: Vec<tobj::Model>, materials: Vec<tobj::Material>, colored: bool
     } else if by_material {
         let mut materials: Vec<Material> = materials.into_iter().map(mtl::material).collect();
         if some_without {
-            materials.push(Material { name: "(none)".into(), diffuse: color::DEFAULT });
+            materials.push(Material::matt("(none)", material::DEFAULT_DIFFUSE));
         }
         mesh.colors = Colors::PerMaterial { materials, of_triangle };
     }

@@ -2,7 +2,7 @@
 
 use super::feed::{parse_f32, split_keyword};
 use crate::mesh::ReadReport;
-use crate::mesh::color::{self, Material};
+use crate::mesh::material::{self, Material};
 use glam::Vec3;
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
@@ -102,6 +102,6 @@ fn diffuse(rest: &[u8]) -> Option<[f32; 3]> {
 
 /// tobj's material as ours, clamped to what a surface can reflect.
 pub(super) fn material(material: tobj::Material) -> Material {
-    let diffuse = material.diffuse.map_or(color::DEFAULT, Vec3::from_array);
-    Material { name: material.name, diffuse: diffuse.clamp(Vec3::ZERO, Vec3::ONE) }
+    let diffuse = material.diffuse.map_or(material::DEFAULT_DIFFUSE, Vec3::from_array);
+    Material::matt(material.name, diffuse.clamp(Vec3::ZERO, Vec3::ONE))
 }

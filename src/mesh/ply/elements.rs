@@ -4,6 +4,7 @@ use super::body::Source;
 use super::header::{Element, Kind, Scalar};
 use crate::mesh::color;
 use crate::mesh::lists::{List, Lists};
+use crate::mesh::material::DEFAULT_DIFFUSE;
 use glam::Vec3;
 
 /// Which item of an element is wrong (counted from 0), and what is wrong with it.
@@ -19,7 +20,7 @@ pub(in crate::mesh) enum Shades<L: Lists> {
 impl<L: Lists> Shades<L> {
     /// Makes the colours of a new element's items, whose type is `kind`, follow `done` items.
     fn begin(&mut self, lists: &L, kind: Scalar, done: usize) -> Result<(), ItemError> {
-        let grey = color::encode(color::DEFAULT);
+        let grey = color::encode(DEFAULT_DIFFUSE);
         if matches!(self, Self::None) {
             *self = match kind.is_float() {
                 true => Self::Floats(lists.list().map_err(no_list)?),

@@ -46,7 +46,7 @@ pub(super) fn parse(
         (None, Some(of_vertices)) => Colors::PerVertex(of_vertices),
         (None, None) => Colors::default(),
     };
-    Ok(Mesh { positions: raw.positions, triangles: raw.triangles, colors })
+    Ok(Mesh { positions: raw.positions, triangles: raw.triangles, colors, ..Mesh::default() })
 }
 
 /// What a PLY file holds, as it stands there.

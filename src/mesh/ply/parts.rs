@@ -98,7 +98,7 @@ mod tests {
     const POSITIONS: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
 
     fn materials() -> Vec<Material> {
-        [Vec3::X, Vec3::Y].map(|diffuse| Material { name: "paint".into(), diffuse }).into()
+        [Vec3::X, Vec3::Y].map(|diffuse| Material::matt("paint", diffuse)).into()
     }
 
     fn parts() -> [Part<'static>; 2] {
@@ -123,6 +123,7 @@ mod tests {
             positions: [&POSITIONS[..3], &POSITIONS].concat(),
             triangles: vec![[0, 1, 2], [6, 4, 5], [3, 5, 6]],
             colors: Colors::PerTriangle(vec![[0, 255, 0], [255, 0, 0], [0, 255, 0]]),
+            ..Mesh::default()
         };
         assert_eq!(loaded.mesh, expected);
         assert_eq!(loaded.report.trailing_bytes, 0);

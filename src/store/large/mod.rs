@@ -13,7 +13,7 @@ mod shelf;
 mod surfaces;
 
 use super::checksum::BLOCK;
-use super::meta::{ColorMeta, ENGINE, MaterialMeta, Meta};
+use super::meta::{ColorMeta, ENGINE, Meta};
 use super::out::Out;
 use super::section::Kind;
 use super::writer::Written;
@@ -195,7 +195,7 @@ fn color_meta(colors: &SpooledColors) -> ColorMeta {
         SpooledColors::PerTriangle(_) => ColorMeta::PerTriangle,
         SpooledColors::PerVertex(_) => ColorMeta::PerVertex,
         SpooledColors::PerMaterial { materials, .. } => {
-            ColorMeta::PerMaterial { materials: materials.iter().map(MaterialMeta::of).collect() }
+            ColorMeta::PerMaterial { materials: materials.clone() }
         }
     }
 }

@@ -17,7 +17,7 @@ use tempfile::TempDir;
 fn meshes() -> Vec<Mesh> {
     let mesh = shapes::soup(300, 1);
     let srgb = |i: usize| [i as u8, (i * 7) as u8, (i / 3) as u8];
-    let material = |name: &str, diffuse| Material { name: name.into(), diffuse };
+    let material = |name: &str, diffuse| Material::matt(name, diffuse);
     let colors = [
         Colors::Uniform(Vec3::new(0.1, 0.7, 1.0 / 3.0)),
         Colors::PerTriangle((0..mesh.triangles.len()).map(srgb).collect()),

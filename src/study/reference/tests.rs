@@ -238,7 +238,12 @@ fn a_t_beyond_all_floats_is_no_hit() {
 
 #[test]
 fn rays_that_make_no_sense_hit_nothing() {
-    let mesh = Mesh { positions: TRIANGLE.into(), triangles: vec![[0, 1, 2]], colors: Colors::default() };
+    let mesh = Mesh {
+        positions: TRIANGLE.into(),
+        triangles: vec![[0, 1, 2]],
+        colors: Colors::default(),
+        ..Mesh::default()
+    };
     let reference = Reference::new(&mesh);
     let good = Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
     assert!(reference.any(&good) && reference.closest(&good).is_hit() && reference.meets(&good, 0).is_some());
@@ -272,6 +277,7 @@ fn the_lowest_of_equals_wins_and_the_others_are_ties() {
         positions: triangles.into_iter().flatten().collect(),
         triangles: (0..5).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         colors: Colors::default(),
+        ..Mesh::default()
     };
     let truth = Reference::new(&mesh).closest(&Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z));
     assert_eq!((truth.primitive, truth.t, truth.t_f64), (0, 1.0, 1.0));
@@ -286,7 +292,7 @@ fn triangles_at_infinity_are_not_there() {
     positions.push(Vec3::new(f32::NAN, 0.0, 0.0));
     positions.push(Vec3::new(0.0, f32::INFINITY, 0.0));
     let triangles = vec![[0, 1, 3], [0, 1, 4], [0, 1, 2]];
-    let mesh = Mesh { positions, triangles, colors: Colors::default() };
+    let mesh = Mesh { positions, triangles, colors: Colors::default(), ..Mesh::default() };
     let reference = Reference::new(&mesh);
     let ray = Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
     assert_eq!(reference.closest(&ray).primitive, 2);

@@ -10,7 +10,7 @@ macro_rules! palette {
             [$(($name, $srgb)),*]
                 .map(|(name, rgb): (&str, u32)| {
                     let [_, r, g, b] = rgb.to_be_bytes();
-                    Material { name: name.into(), diffuse: decode([r, g, b]) }
+                    Material::matt(name, decode([r, g, b]))
                 })
                 .into()
         }
