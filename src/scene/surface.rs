@@ -31,6 +31,10 @@ pub trait Surface: Sync {
     fn images(&self) -> &[Image];
     /// Whether any triangle has texture coordinates or normals.
     fn has_attributes(&self) -> bool;
+    /// How many triangles each of the materials has.
+    fn uses(&self) -> Vec<u64>;
+    /// The triangles whose material gives off light, in the order of their numbers.
+    fn emitters(&self) -> Vec<u32>;
 }
 
 /// What shading looks at.
@@ -211,6 +215,14 @@ impl Surface for CachedSurface {
     fn has_attributes(&self) -> bool {
         false
     }
+
+    fn uses(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    fn emitters(&self) -> Vec<u32> {
+        Vec::new()
+    }
 }
 
 impl Surface for Mesh {
@@ -250,6 +262,22 @@ impl Surface for Mesh {
     fn has_attributes(&self) -> bool {
         !self.attributes.is_empty()
     }
+
+    fn uses(&self) -> Vec<u64> {
+        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
+        let mut uses = vec![0; materials.len()];
+        of_triangle.iter().for_each(|&material| uses[material as usize] += 1);
+        uses
+    }
+
+    fn emitters(&self) -> Vec<u32> {
+        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
+        let emits: Vec<bool> = materials.iter().map(|material| material.emission != Vec3::ZERO).collect();
+        if !emits.contains(&true) {
+            return Vec::new();
+        }
+        (0..).zip(of_triangle).filter(|&(_, &material)| emits[material as usize]).map(|(i, _)| i).collect()
+    }
 }
 
 impl Surface for Stored {
@@ -285,5 +313,13 @@ impl Surface for Stored {
 
     fn has_attributes(&self) -> bool {
         false
+    }
+
+    fn uses(&self) -> Vec<u64> {
+        Vec::new()
+    }
+
+    fn emitters(&self) -> Vec<u32> {
+        Vec::new()
     }
 }
