@@ -4,6 +4,7 @@
 //! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on.
 
 mod camera;
+pub mod effects;
 mod framing;
 mod light;
 mod parse;

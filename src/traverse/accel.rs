@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
 use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query};
 use super::records::Resident;
+use super::sieve::{Sieve, Sifted};
 use super::tile::{PACKETS, TileCounts};
 use super::width::PacketWidth;
 use crate::cache::Cached;
@@ -160,6 +161,21 @@ impl Accel {
         match self.accuracy {
             Accuracy::Fast => {
                 let projected = Resident { tree, records: &self.projected };
+                self.chosen.run(InMode::<_, Fast, _>::new(query, &projected))
+            }
+            Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles)),
+            Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &triangles)),
+        }
+    }
+
+    /// Has a kernel called for a scene that is all in memory and whose triangles have holes. Panics if it is not.
+    #[inline(always)]
+    pub(super) fn ask_sifted<Q: Query>(&self, sieve: &dyn Sieve, query: Q) -> Q::Output {
+        let tree = self.tree();
+        let triangles = Sifted { resident: Resident { tree, records: tree.triangles() }, sieve };
+        match self.accuracy {
+            Accuracy::Fast => {
+                let projected = Sifted { resident: Resident { tree, records: &self.projected }, sieve };
                 self.chosen.run(InMode::<_, Fast, _>::new(query, &projected))
             }
             Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles)),

@@ -14,6 +14,7 @@ use super::closest::Closest;
 use super::lanes::{HitPacket, RayPacket};
 use super::range::{adapt, is_ordinary};
 use super::records::Records;
+use super::sieve::sift;
 use super::stack::Stack;
 use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::triangle::{Mode, Test};
@@ -122,7 +123,10 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
         if !primitives.is_empty() {
             let live = interval.live();
             for &primitive in primitives {
-                let candidate = test.test(tree.record_of(primitive), live);
+                let mut candidate = test.test(tree.record_of(primitive), live);
+                if T::SIFTS {
+                    sift::<W, L, T, M>(tree, &mut candidate, primitive, [tnear, closest.t], live);
+                }
                 closest.take::<ANY>(&candidate, primitive, tnear, live, true);
             }
         }

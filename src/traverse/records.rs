@@ -1,5 +1,6 @@
 //! What a kernel reads of a tree's triangles.
 
+use super::sieve::Sieve;
 use crate::cache::View;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Mode, Triangle};
@@ -7,8 +8,17 @@ use crate::kdtree::{KdTree, Node, Scale, Tree};
 
 /// A tree, with what a mode keeps of each of its triangles.
 pub trait Records<M: Mode>: Tree {
+    /// Whether triangles have holes.
+    const SIFTS: bool = false;
+
     /// What is kept of a triangle.
     fn record_of(&self, primitive: u32) -> &M::Record;
+
+    /// What says where triangles have holes, if any have.
+    #[inline(always)]
+    fn sieve(&self) -> Option<&dyn Sieve> {
+        None
+    }
 }
 
 /// A tree in memory, and the records of a mode, by primitive id.

@@ -1,0 +1,122 @@
+//! Light that comes to a matt surface straight from where it is made.
+
+use super::path::{Path, Use};
+use super::point::Point;
+use crate::geometry::Ray;
+use crate::render::scatter::{Sequence, cosine_hemisphere, Basis, ggx};
+use crate::scene::effects::{Effect, EffectSet, SMOOTH};
+use crate::scene::{Light, Lights, ShadowRay};
+use glam::Vec3;
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// A ray to a light, and what arrives along it if nothing is in the way.
+#[derive(Clone, Copy, Debug)]
+pub struct LightRay {
+    pub ray: Ray,
+    pub pixel: u16,
+    /// The effect whose shadow it casts.
+    pub effect: Effect,
+    pub light: Vec3,
+}
+
+/// The smoothest surface on which lights make highlights: that of a light without extent is invisible on a mirror.
+const SHARPEST: f32 = 0.03;
+
+/// What lights a frame.
+pub struct Direct<'a> {
+    pub lights: &'a Lights,
+    pub set: EffectSet,
+    /// How far a surface may be that takes light from everywhere away.
+    pub reach: f32,
+}
+
+impl Direct<'_> {
+    /// Adds to `sum` the light that arrives at a matt surface whatever is in the way, and to `rays` what depends on
+    /// that. `weight` is the part that the eye gets of what is thrown back.
+    #[inline]
+    pub fn gather(
+        &self,
+        path: &Path,
+        point: &Point<'_>,
+        sequence: &Sequence,
+        [matt, gloss]: [Vec3; 2],
+        sum: &mut Vec3,
+        rays: &mut Vec<LightRay>,
+    ) {
+        let mut add = |effect: Effect, ray: Ray, light: Vec3| {
+            if light.max_element() <= 0.0 {
+            } else if self.set.has(effect) {
+                rays.push(LightRay { ray, pixel: path.pixel, effect, light });
+            } else {
+                *sum += light;
+            }
+        };
+        let origin = point.origin(true);
+        if let Some(light) = &self.lights.key {
+            let way = light.from(origin);
+            let light = self.key(point, light, &way, [matt, gloss]);
+            add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
+        }
+        if let Some(emitters) = &self.lights.emitters {
+            let [pick, _] = path.random(sequence, Use::Light);
+            let light = emitters.sample(pick, path.random(sequence, Use::LightPlace));
+            let way = light.position - origin;
+            let distance = way.length();
+            let toward = way / distance;
+            let cosines = point.normal.dot(toward).max(0.0) * light.normal.dot(toward).abs();
+            // A point on the light itself, or on its back's edge, gets nothing from here.
+            if cosines > 0.0 && point.face.dot(toward) > 0.0 && distance > 0.0 && light.pdf_area > 0.0 {
+                let scattered = matt * FRAC_1_PI + gloss * self.lobe(point, toward);
+                let light = scattered * light.radiance * (cosines / (distance * distance * light.pdf_area));
+                // Short of the light, which would hide itself.
+                let ray = Ray::segment(origin, way, 0.0, 1.0 - 1e-4);
+                add(Effect::SoftShadows, ray, light);
+            }
+        }
+        if let Some(environment) = &self.lights.environment {
+            let sample = environment.sample(path.random(sequence, Use::Environment));
+            let cosine = point.normal.dot(sample.direction);
+            if cosine > 0.0 && point.face.dot(sample.direction) > 0.0 && sample.pdf > 0.0 {
+                let scattered = matt * FRAC_1_PI + gloss * self.lobe(point, sample.direction);
+                let light = scattered * sample.radiance * (cosine / sample.pdf);
+                add(Effect::Environment, Ray::new(origin, sample.direction), light);
+            }
+        }
+        if self.set.has(Effect::Interreflection) {
+            return;
+        }
+        let Some(ambient) = &self.lights.ambient else { return };
+        if self.set.has(Effect::AmbientOcclusion) {
+            let local = cosine_hemisphere(path.random(sequence, Use::Occlusion));
+            let toward = Basis::of(point.normal).to_world(local);
+            if point.face.dot(toward) > 0.0 {
+                let ray = Ray::segment(origin, toward, 0.0, self.reach);
+                add(Effect::AmbientOcclusion, ray, matt * ambient.irradiance(point.normal));
+            }
+        } else {
+            *sum += matt * ambient.irradiance(point.normal);
+        }
+    }
+
+    /// Light of the key light. Its irradiance is what a white surface that faces it throws back: that divided by
+    /// pi.
+    #[inline]
+    fn key(&self, point: &Point<'_>, _: &Light, way: &ShadowRay, [matt, gloss]: [Vec3; 2]) -> Vec3 {
+        let cosine = point.normal.dot(way.toward);
+        if cosine <= 0.0 || point.face.dot(way.toward) <= 0.0 {
+            return Vec3::ZERO;
+        }
+        (matt + gloss * (PI * self.lobe(point, way.toward))) * way.irradiance * cosine
+    }
+
+    /// How much of the light from `toward` a surface throws to the eye near the mirror's direction, for each unit of
+    /// its specular reflectance.
+    #[inline]
+    fn lobe(&self, point: &Point<'_>, toward: Vec3) -> f32 {
+        if !self.set.has(Effect::Highlights) || point.specular == Vec3::ZERO {
+            return 0.0;
+        }
+        let basis = Basis::of(point.normal);
+        ggx::evaluate(basis.to_local(point.toward), basis.to_local(toward), point.roughness.max(SHARPEST.max(SMOOTH)))
+    }
+}

@@ -1,0 +1,195 @@
+//! Rays to kernels: each kind to where it is quick.
+
+use super::direct::LightRay;
+use super::holes::Holes;
+use super::path::Way;
+use crate::geometry::{Hit, Ray};
+use crate::scene::Surface;
+use crate::scene::effects::Effect;
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, RayPacket};
+use std::time::Duration;
+
+/// Rays that go to a kernel at once: sixteen packets of sixteen.
+const LOT: usize = 256;
+
+/// Traces a worker's rays, and learns which kernel is quickest for which kind of them.
+#[derive(Debug, Default)]
+pub struct Tracer {
+    /// What was learnt about rays that may have much in common.
+    ways: [Dispatch; Way::ALL.len()],
+    /// The same of rays to lights.
+    lights: [Dispatch; 4],
+    /// Time in which hits were shaded.
+    pub shading: Duration,
+    packets: Packets,
+    found: Vec<bool>,
+    sifted: Vec<Ray>,
+    sifted_hits: Vec<Hit>,
+}
+
+/// A lot as packets.
+#[derive(Debug)]
+struct Packets {
+    rays: Vec<RayPacket<16>>,
+    active: Vec<u32>,
+    hits: Vec<HitPacket<16>>,
+    occluded: Vec<u32>,
+}
+
+impl Default for Packets {
+    fn default() -> Self {
+        let count = LOT / 16;
+        Self {
+            rays: vec![RayPacket::empty(); count],
+            active: vec![0; count],
+            hits: vec![HitPacket::miss(); count],
+            occluded: vec![0; count],
+        }
+    }
+}
+
+impl Packets {
+    /// Takes up at most a lot of rays, and says how many packets they fill.
+    fn fill(&mut self, rays: &[Ray]) -> usize {
+        for ((rays, packet), active) in rays.chunks(16).zip(&mut self.rays).zip(&mut self.active) {
+            *packet = RayPacket::of_slice(rays);
+            *active = ((1_u64 << rays.len()) - 1) as u32;
+        }
+        rays.len().div_ceil(16)
+    }
+}
+
+impl Tracer {
+    /// With what was learnt in earlier frames about camera rays and shadow rays.
+    pub fn new(learnt: Dispatch) -> Self {
+        let mut tracer = Self::default();
+        tracer.ways[Way::Camera as usize] = learnt;
+        tracer.lights[0] = learnt;
+        tracer
+    }
+
+    /// What was learnt about camera rays.
+    pub fn learnt(&self) -> Dispatch {
+        self.ways[Way::Camera as usize]
+    }
+
+    /// The closest hits of rays of one kind, by the kernel named or, for [`Kernel::Tile`], by whichever is quickest.
+    pub fn intersect(&mut self, accel: &Accel, kernel: Kernel, way: Way, rays: &[Ray], hits: &mut [Hit]) {
+        match (kernel, way) {
+            (Kernel::Tile, Way::Diffuse) => accel.intersect_many(Kernel::Stream, rays, hits),
+            (Kernel::Tile, _) => {
+                let dispatch = &mut self.ways[way as usize];
+                for (rays, hits) in rays.chunks(LOT).zip(hits.chunks_mut(LOT)) {
+                    let packets = &mut self.packets;
+                    let count = packets.fill(rays);
+                    let found = &mut packets.hits[..count];
+                    dispatch.intersect(accel, &packets.rays[..count], &packets.active[..count], found);
+                    for (i, hit) in hits.iter_mut().enumerate() {
+                        *hit = found[i / 16].get(i % 16);
+                    }
+                }
+            }
+            (kernel, _) => accel.intersect_many(kernel, rays, hits),
+        }
+    }
+
+    /// Whether anything is in the way of rays that cast the shadows of `effect`; answers go to the places `to`.
+    pub fn occluded(
+        &mut self,
+        accel: &Accel,
+        kernel: Kernel,
+        effect: Effect,
+        rays: &[Ray],
+        to: &[usize],
+        occluded: &mut [bool],
+    ) {
+        self.found.clear();
+        self.found.resize(rays.len(), false);
+        if kernel == Kernel::Tile {
+            let dispatch = match effect {
+                Effect::Shadows => &mut self.lights[0],
+                Effect::SoftShadows => &mut self.lights[1],
+                Effect::Environment => &mut self.lights[2],
+                _ => &mut self.lights[3],
+            };
+            for (rays, found) in rays.chunks(LOT).zip(self.found.chunks_mut(LOT)) {
+                let packets = &mut self.packets;
+                let count = packets.fill(rays);
+                let lanes = &mut packets.occluded[..count];
+                dispatch.occluded(accel, &packets.rays[..count], &packets.active[..count], lanes);
+                for (i, found) in found.iter_mut().enumerate() {
+                    *found = lanes[i / 16] >> (i % 16) & 1 == 1;
+                }
+            }
+        } else {
+            accel.occluded_many(kernel, rays, &mut self.found);
+        }
+        for (&to, &found) in to.iter().zip(&self.found) {
+            occluded[to] = found;
+        }
+    }
+
+    /// Lets the rays at the places `asked` go on through holes, from the hits that they have on.
+    pub fn intersect_sifted<S: Surface>(
+        &mut self,
+        accel: &Accel,
+        holes: &Holes<'_, S>,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        asked: &[usize],
+    ) {
+        self.sifted.clear();
+        self.sifted.extend(asked.iter().map(|&i| Ray { tnear: hits[i].t, ..rays[i] }));
+        self.sifted_hits.clear();
+        self.sifted_hits.resize(asked.len(), Hit::MISS);
+        if accel.cached().is_none() {
+            accel.intersect_sifted(holes, &self.sifted, &mut self.sifted_hits);
+        } else {
+            // Who looks at surfaces that are not all in memory traces nothing meanwhile: hit by hit, then.
+            for (ray, hit) in self.sifted.iter_mut().zip(&mut self.sifted_hits) {
+                *hit = first_there(accel, holes, ray);
+            }
+        }
+        for (&i, hit) in asked.iter().zip(&self.sifted_hits) {
+            hits[i] = *hit;
+        }
+    }
+
+    /// Finds out of the rays to lights at the places `asked`, which something is in the way of, whether that is all
+    /// holes.
+    pub fn occluded_sifted<S: Surface>(
+        &mut self,
+        accel: &Accel,
+        holes: &Holes<'_, S>,
+        lights: &[LightRay],
+        asked: &[usize],
+        occluded: &mut [bool],
+    ) {
+        self.sifted.clear();
+        self.sifted.extend(asked.iter().map(|&i| lights[i].ray));
+        self.found.clear();
+        self.found.resize(asked.len(), false);
+        if accel.cached().is_none() {
+            accel.occluded_sifted(holes, &self.sifted, &mut self.found);
+        } else {
+            for (ray, found) in self.sifted.iter_mut().zip(&mut self.found) {
+                *found = first_there(accel, holes, ray).is_hit();
+            }
+        }
+        for (&i, &found) in asked.iter().zip(&self.found) {
+            occluded[i] = found;
+        }
+    }
+}
+
+/// The first hit that is no hole, ray by ray.
+fn first_there<S: Surface>(accel: &Accel, holes: &Holes<'_, S>, ray: &mut Ray) -> Hit {
+    loop {
+        let hit = accel.intersect(ray);
+        if !hit.is_hit() || holes.is_there_for(&holes.surface().reader(), hit.primitive, hit.u, hit.v) {
+            return hit;
+        }
+        // The same triangle, and what coincides with it, is behind the ray from here on.
+        ray.tnear = hit.t.next_up();
+    }
+}

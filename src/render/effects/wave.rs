@@ -1,0 +1,331 @@
+//! All paths of a sample, wave after wave.
+//!
+//! What a wave's rays hit is shaded before the next wave is traced, so that kernels get rays by the hundred, each
+//! kind by itself: those from a camera or off a mirror have much in common, those off a matt surface nothing. A
+//! pixel's light is added up in the order of its own paths, whoever its neighbours are: pictures are the same for
+//! every size of a tile.
+
+use super::bounce::{Bounce, Queues};
+use super::cost::Tallies;
+use super::direct::{Direct, LightRay};
+use super::holes::Holes;
+use super::path::{Path, Way};
+use super::point::Resolver;
+use super::trace::Tracer;
+use crate::geometry::{Hit, Ray};
+use crate::mesh::Material;
+use crate::render::scatter::Sequence;
+use crate::render::stats::Tally;
+use crate::scene::effects::{Effect, EffectSet};
+use crate::scene::{Look, Surface};
+use crate::traverse::{Accel, Kernel};
+use glam::Vec3;
+use std::time::Instant;
+
+/// All that paths meet.
+pub struct World<'a, S> {
+    pub accel: &'a Accel,
+    /// What traces: [`Kernel::Tile`] for whatever is quickest.
+    pub kernel: Kernel,
+    pub surface: &'a S,
+    pub resolver: Resolver<'a>,
+    pub direct: Direct<'a>,
+    pub bounce: Bounce,
+    pub holes: Option<Holes<'a, S>>,
+    pub set: EffectSet,
+}
+
+/// What a wave's work is kept in.
+#[derive(Debug, Default)]
+pub struct Waves {
+    pub tracer: Tracer,
+    pub tallies: Tallies,
+    /// Camera rays.
+    pub camera: Tally,
+    queues: [Queues; 2],
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+    lights: Vec<LightRay>,
+    light_rays: Vec<Ray>,
+    occluded: Vec<bool>,
+    asked: Vec<usize>,
+}
+
+/// Effects that need surfaces' pictures, coordinates or normals.
+const MAPS: EffectSet = EffectSet::of(&[
+    Effect::Textures,
+    Effect::Bump,
+    Effect::SmoothNormals,
+    Effect::CutOuts,
+    Effect::Transparency,
+]);
+
+/// Effects that send rays on from where others arrive, whatever the material.
+const EVERYWHERE: EffectSet = EffectSet::of(&[Effect::Interreflection]);
+
+/// Effects of materials that send rays on.
+const RAYS: EffectSet = EffectSet::of(&[
+    Effect::Transparency,
+    Effect::Emission,
+    Effect::Highlights,
+    Effect::Reflection,
+    Effect::Glossy,
+    Effect::Refraction,
+]);
+
+/// The layers that a ray to a light goes through at most: what is behind more is dark.
+const LAYERS: usize = 32;
+
+/// The first hits of a pixel's first sample: how far away, and the unit normal on the eye's side.
+pub type Seen = Vec<Option<(f32, Vec3)>>;
+
+impl<S: Surface> World<'_, S> {
+    /// Traces paths from the camera and all that follows from them, and adds each pixel's light to `sums`. `seen`
+    /// is filled in for those pixels if it is given.
+    pub fn run(
+        &self,
+        waves: &mut Waves,
+        camera: &mut Vec<Path>,
+        sequence: impl Fn(u16) -> Sequence,
+        sums: &mut [Vec3],
+        mut seen: Option<&mut Seen>,
+    ) {
+        std::mem::swap(waves.queues[0].of(Way::Camera), camera);
+        let mut now = 0;
+        while !waves.queues[now].is_empty() {
+            for way in Way::ALL {
+                let mut paths = std::mem::take(waves.queues[now].of(way));
+                if !paths.is_empty() {
+                    self.trace(waves, way, &paths);
+                    let mut next = std::mem::take(&mut waves.queues[1 - now]);
+                    let start = Instant::now();
+                    self.shade(waves, &paths, &sequence, sums, &mut next, seen.as_deref_mut());
+                    waves.tracer.shading += start.elapsed();
+                    waves.queues[1 - now] = next;
+                    self.light(waves, sums);
+                }
+                paths.clear();
+                *waves.queues[now].of(way) = paths;
+                seen = None;
+            }
+            now = 1 - now;
+        }
+        std::mem::swap(waves.queues[0].of(Way::Camera), camera);
+    }
+
+    /// Finds what the paths' rays hit.
+    fn trace(&self, waves: &mut Waves, way: Way, paths: &[Path]) {
+        let start = Instant::now();
+        waves.rays.clear();
+        waves.rays.extend(paths.iter().map(|path| path.ray));
+        waves.hits.clear();
+        waves.hits.resize(paths.len(), Hit::MISS);
+        waves.tracer.intersect(self.accel, self.kernel, way, &waves.rays, &mut waves.hits);
+        let (rays, time) = (paths.len() as u64, start.elapsed());
+        match way.effect() {
+            Some(effect) => waves.tallies.add(effect, rays, time),
+            None => waves.camera += Tally { rays, time },
+        }
+        if let Some(holes) = &self.holes {
+            let start = Instant::now();
+            let surfaces = self.surface.reader();
+            waves.asked.clear();
+            waves.asked.extend((0..paths.len()).filter(|&i| {
+                let Hit { u, v, primitive, .. } = waves.hits[i];
+                waves.hits[i].is_hit() && !holes.is_there_for(&surfaces, primitive, u, v)
+            }));
+            drop(surfaces);
+            let Waves { tracer, rays, hits, asked, .. } = waves;
+            tracer.intersect_sifted(self.accel, holes, rays, hits, asked);
+            waves.tallies.add(Effect::CutOuts, waves.asked.len() as u64, start.elapsed());
+        }
+    }
+
+    /// Shades what the rays hit: by the least kernel that does all that these surfaces call for.
+    fn shade(
+        &self,
+        waves: &mut Waves,
+        paths: &[Path],
+        sequence: &impl Fn(u16) -> Sequence,
+        sums: &mut [Vec3],
+        next: &mut Queues,
+        seen: Option<&mut Seen>,
+    ) {
+        let surfaces = self.surface.reader();
+        let calls = waves.hits.iter().filter(|hit| hit.is_hit()).fold(EffectSet::NONE, |calls, hit| {
+            let number = surfaces.material(hit.primitive);
+            calls.or(self.resolver.calls.get(number as usize).copied().unwrap_or(EffectSet::NONE))
+        });
+        let calls = calls.and(self.set).or(self.set.and(EffectSet::of(&[Effect::SmoothNormals])));
+        let job = Job { paths, hits: &waves.hits, sequence, surfaces: &surfaces };
+        let lights = &mut waves.lights;
+        lights.clear();
+        let goes_on = calls.has_any(RAYS) || self.set.has_any(EVERYWHERE);
+        match (calls.has_any(MAPS), goes_on) {
+            (false, false) => self.shade_with::<false, false>(&job, lights, sums, next, seen),
+            (true, false) => self.shade_with::<true, false>(&job, lights, sums, next, seen),
+            (false, true) => self.shade_with::<false, true>(&job, lights, sums, next, seen),
+            (true, true) => self.shade_with::<true, true>(&job, lights, sums, next, seen),
+        }
+    }
+
+    /// With `MAPS`, surfaces have pictures, coordinates and normals; with `RAYS`, rays go on from them.
+    fn shade_with<const MAPS: bool, const RAYS: bool>(
+        &self,
+        job: &Job<'_, impl Look, impl Fn(u16) -> Sequence>,
+        lights: &mut Vec<LightRay>,
+        sums: &mut [Vec3],
+        next: &mut Queues,
+        mut seen: Option<&mut Seen>,
+    ) {
+        for (path, hit) in job.paths.iter().zip(job.hits) {
+            let sum = &mut sums[path.pixel as usize];
+            if !hit.is_hit() {
+                if path.sees_lights || self.direct.lights.environment.is_none() {
+                    *sum += path.weight * self.behind(path);
+                }
+                continue;
+            }
+            let sequence = (job.sequence)(path.pixel);
+            let point = self.resolver.resolve::<MAPS>(job.surfaces, path, hit);
+            if let Some(seen) = &mut seen {
+                seen[path.pixel as usize] = Some((point.distance, point.face));
+            }
+            let mut weight = path.weight;
+            if RAYS {
+                weight *= path.media.attenuation(point.distance);
+                if point.opacity < 1.0 {
+                    self.bounce.through(path, &point, &sequence, weight * (1.0 - point.opacity), next);
+                    weight *= point.opacity;
+                }
+                if path.sees_lights && self.set.has(Effect::Emission) {
+                    *sum += weight * point.emission;
+                }
+            }
+            if point.material.unlit {
+                *sum += weight * point.diffuse;
+                continue;
+            }
+            let scattered = if RAYS {
+                self.bounce.specular(path, &point, &sequence, weight, next)
+            } else {
+                [weight * point.diffuse, Vec3::ZERO]
+            };
+            if scattered != [Vec3::ZERO; 2] {
+                self.direct.gather(path, &point, &sequence, scattered, sum, lights);
+            }
+            if RAYS && self.set.has(Effect::Interreflection) {
+                self.bounce.diffuse(path, &point, &sequence, scattered[0], next);
+            }
+        }
+    }
+
+    /// What a ray sees that hits nothing.
+    #[inline]
+    fn behind(&self, path: &Path) -> Vec3 {
+        let direction = path.ray.direction;
+        match (&self.direct.lights.ambient, path.way) {
+            // What falls on matt surfaces from everywhere, not what the sky looks like.
+            (Some(ambient), Way::Diffuse) => ambient.irradiance(direction.normalize_or_zero()),
+            _ => self.direct.lights.background(direction),
+        }
+    }
+
+    /// Adds the light that nothing is in the way of.
+    fn light(&self, waves: &mut Waves, sums: &mut [Vec3]) {
+        if waves.lights.is_empty() {
+            return;
+        }
+        waves.occluded.clear();
+        waves.occluded.resize(waves.lights.len(), false);
+        const KINDS: [Effect; 4] =
+            [Effect::Shadows, Effect::SoftShadows, Effect::Environment, Effect::AmbientOcclusion];
+        for effect in KINDS {
+            waves.asked.clear();
+            waves.asked.extend((0..waves.lights.len()).filter(|&i| waves.lights[i].effect == effect));
+            if waves.asked.is_empty() {
+                continue;
+            }
+            let start = Instant::now();
+            waves.light_rays.clear();
+            waves.light_rays.extend(waves.asked.iter().map(|&i| waves.lights[i].ray));
+            waves.tracer.occluded(self.accel, self.kernel, effect, &waves.light_rays, &waves.asked, &mut waves.occluded);
+            waves.tallies.add(effect, waves.asked.len() as u64, start.elapsed());
+        }
+        self.see_through(waves);
+        for (light, occluded) in waves.lights.iter().zip(&waves.occluded) {
+            if !occluded {
+                sums[light.pixel as usize] += light.light;
+            }
+        }
+    }
+
+    /// Looks again at the light that something is in the way of: it may have holes, or let light through.
+    fn see_through(&self, waves: &mut Waves) {
+        let lets_light_through = EffectSet::of(&[Effect::Transparency, Effect::Refraction]);
+        let effect = match (&self.holes, self.set.has_any(lets_light_through)) {
+            (_, true) => Effect::Transparency,
+            (Some(_), false) => Effect::CutOuts,
+            (None, false) => return,
+        };
+        let start = Instant::now();
+        let Waves { tracer, lights, occluded, rays, hits, asked, tallies, .. } = waves;
+        asked.clear();
+        asked.extend((0..lights.len()).filter(|&i| occluded[i]));
+        let mut cast = asked.len() as u64;
+        if let (Some(holes), Effect::CutOuts) = (&self.holes, effect) {
+            tracer.occluded_sifted(self.accel, holes, lights, asked, occluded);
+        } else {
+            // Layer by layer, each taking its part of the light.
+            for _ in 0..LAYERS {
+                if asked.is_empty() {
+                    break;
+                }
+                rays.clear();
+                rays.extend(asked.iter().map(|&i| lights[i].ray));
+                hits.clear();
+                hits.resize(rays.len(), Hit::MISS);
+                tracer.intersect(self.accel, self.kernel, Way::Through, rays, hits);
+                cast += rays.len() as u64;
+                let surfaces = self.surface.reader();
+                let mut place = 0;
+                asked.retain(|&i| {
+                    let hit = hits[place];
+                    place += 1;
+                    let light = &mut lights[i];
+                    if !hit.is_hit() {
+                        occluded[i] = false;
+                        return false;
+                    }
+                    light.light *= self.passing(&surfaces, &light.ray, &hit);
+                    light.ray.tnear = hit.t.next_up();
+                    light.light.max_element() > 0.0
+                });
+            }
+        }
+        tallies.add(effect, cast, start.elapsed());
+    }
+
+    /// The part of the light that goes straight through a surface. What bends light is taken to let it pass
+    /// unbent: a point of light would never be found behind it otherwise.
+    fn passing(&self, surfaces: &impl Look, ray: &Ray, hit: &Hit) -> Vec3 {
+        if let Some(holes) = &self.holes
+            && !holes.is_there_for(surfaces, hit.primitive, hit.u, hit.v)
+        {
+            return Vec3::ONE;
+        }
+        let path = Path::of_ray(*ray);
+        let point = self.resolver.resolve::<true>(surfaces, &path, hit);
+        let material: &Material = point.material;
+        let gone_through = if self.set.has(Effect::Refraction) { material.transmission } else { Vec3::ZERO };
+        Vec3::splat(1.0 - point.opacity) + gone_through * point.opacity
+    }
+}
+
+/// Paths that are to be shaded, and what they hit.
+struct Job<'a, L, F> {
+    paths: &'a [Path],
+    hits: &'a [Hit],
+    sequence: &'a F,
+    surfaces: &'a L,
+}
