@@ -12,6 +12,7 @@ mod offset;
 mod order;
 mod renderer;
 mod sampling;
+pub mod scatter;
 mod scheduler;
 mod settings;
 mod shade;
