@@ -6,6 +6,7 @@
 //! number of threads, tile size, packet width and instruction set.**
 
 mod bounded;
+mod effects;
 mod frame;
 pub mod image;
 mod offset;
@@ -20,6 +21,7 @@ mod stats;
 mod tile;
 
 pub use bounded::{First, FirstStats};
+pub use effects::{Appearance, EffectCosts, Limits};
 pub use frame::Frame;
 pub use offset::offset_point;
 pub use order::{Tile, tiles};

@@ -1,6 +1,7 @@
 //! Cameras to frames.
 
 use super::bounded::{First, FirstStats, StandIn, StandInCost};
+use super::effects::{Appearance, EffectCosts, EffectScratch, EffectTask, Tallies};
 use super::frame::{Frame, TilePixels, TiledFrame};
 use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
@@ -10,6 +11,7 @@ use super::stats::{FrameStats, RayCount, Tally, quantile};
 use super::tile::{Calls, Scratch, TileTask};
 use crate::error::Result;
 use crate::mesh::Mesh;
+use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
 use std::collections::HashSet;
@@ -29,6 +31,8 @@ pub struct Renderer<'a, S = Mesh> {
     frames: AtomicUsize,
     /// What boxes cost in the frames before.
     stand_in: StandInCost,
+    /// What there is to show beside matt surfaces, if anything.
+    appearance: Option<&'a Appearance>,
 }
 
 /// A frame that is to be drawn.
@@ -58,7 +62,16 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
         let learnt = DispatchPool::default();
         let (frames, stand_in) = (AtomicUsize::new(0), StandInCost::default());
-        Ok(Self { accel, surface, settings, tiles, learnt, frames, stand_in })
+        Ok(Self { accel, surface, settings, tiles, learnt, frames, stand_in, appearance: None })
+    }
+
+    /// The same, with effects. Light then comes from `appearance`, not from what frames are given.
+    ///
+    /// # Errors
+    /// As [`Limits::check`](super::Limits::check).
+    pub fn with_appearance(self, appearance: &'a Appearance) -> Result<Self> {
+        appearance.limits.check()?;
+        Ok(Self { appearance: Some(appearance), ..self })
     }
 
     /// The settings.
@@ -119,6 +132,15 @@ impl<'a, S: Surface> Renderer<'a, S> {
     }
 
     fn drawn_by_kernel(&self, wanted: &Wanted<'_>) -> Drawn {
+        let Some(appearance) = self.appearance else { return self.drawn_plain(wanted) };
+        // A first picture has no effects: it has boxes for what it lacks.
+        let first = wanted
+            .limit
+            .and_then(|_| self.drawn_plain(&Wanted { tiles_done: &AtomicUsize::new(0), ..*wanted }).first);
+        Drawn { first, ..self.drawn_with_effects(appearance, wanted) }
+    }
+
+    fn drawn_plain(&self, wanted: &Wanted<'_>) -> Drawn {
         match self.settings.tuning.packet {
             Kernel::Single => self.drawn_with(Calls::<1>::PACKETS, wanted),
             Kernel::Packet4 => self.drawn_with(Calls::<4>::PACKETS, wanted),
@@ -156,12 +178,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 task.stand_in = Some(StandIn { cached, view, cost: &self.stand_in });
             }
         }
-        // What the last frame has used last is there still: this one begins with it.
-        let backwards = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some();
-        let mut jobs = tiled.split(&self.tiles);
-        if backwards {
-            jobs.reverse();
-        }
+        let jobs = self.jobs(&mut tiled);
         self.pass(&task, jobs, wanted, &mut outcome);
 
         if let (Some(cached), Some(_)) = (self.accel.cached(), wanted.limit) {
@@ -184,6 +201,82 @@ impl<'a, S: Surface> Renderer<'a, S> {
         Drawn { first, frame, stats: self.stats(&outcome, threads, start.elapsed().as_secs_f64()) }
     }
 
+    fn drawn_with_effects(&self, appearance: &Appearance, wanted: &Wanted<'_>) -> Drawn {
+        let start = Instant::now();
+        let RenderSettings { size, samples, aovs, ref tuning, .. } = self.settings;
+        let task = EffectTask {
+            world: appearance.world(self.accel, self.surface, tuning.packet),
+            view: wanted.camera.view(size.width, size.height),
+            samples,
+            error: appearance.limits.error,
+        };
+        if let Some(cached) = self.accel.cached() {
+            cached.begin_frame();
+        }
+        let mut tiled = TiledFrame::new(size, aovs);
+        let outcome = self.workers().run(
+            self.jobs(&mut tiled),
+            || EffectScratch::new(self.learnt.take()),
+            |scratch: &mut EffectScratch, pixels: TilePixels<'_>| {
+                task.render(scratch, pixels);
+                wanted.tiles_done.fetch_add(1, Ordering::Relaxed);
+            },
+        );
+        outcome.states.iter().for_each(|scratch| self.learnt.put(scratch.waves.tracer.learnt()));
+        let frame = tiled.assemble(size, &self.tiles);
+
+        let mut costs = Tallies::default();
+        outcome.states.iter().for_each(|scratch| costs += scratch.waves.tallies);
+        let camera: Tally = outcome.states.iter().map(|scratch| scratch.waves.camera).sum();
+        let mut times: Vec<f32> =
+            outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied()).collect();
+        let seconds = start.elapsed().as_secs_f64();
+        let threads = tuning.worker_count();
+        let samples: u64 = outcome.states.iter().map(|scratch| scratch.samples).sum();
+        let stats = FrameStats {
+            camera: RayCount::new(camera, threads),
+            shadow: RayCount::new(costs[Effect::Shadows], threads),
+            total: RayCount::of(camera.rays + costs.rays(), seconds),
+            seconds,
+            tiles: self.tiles.len(),
+            tile_p50: quantile(&mut times, 0.5),
+            tile_p99: quantile(&mut times, 0.99),
+            threads,
+            pinned: outcome.pinned,
+            samples: samples as f64 / size.pixels() as f64,
+            effects: EffectCosts::new(appearance.set, &costs, threads),
+        };
+        Drawn { first: None, frame, stats }
+    }
+
+    /// A frame's tiles, in the order in which they are to be begun.
+    fn jobs<'t>(&self, tiled: &'t mut TiledFrame) -> Vec<TilePixels<'t>> {
+        // What the last frame has used last is there still: this one begins with it.
+        let backwards = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some();
+        let mut jobs = tiled.split(&self.tiles);
+        if backwards {
+            jobs.reverse();
+        }
+        jobs
+    }
+
+    /// Who renders tiles.
+    fn workers(&self) -> Workers {
+        let tuning = &self.settings.tuning;
+        let threads = tuning.worker_count();
+        match self.accel.cached() {
+            None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
+            // Some wait for their blocks while others are at work.
+            Some(cached) => {
+                // Where blocks have to go, tiles that are begun at about the same time are neighbours, so that they
+                // need the same ones. Where all have room, each worker has a part of the picture to itself, as
+                // in memory, and what is near it in its own caches.
+                let sharing = if cached.is_short() { Sharing::Queue } else { Sharing::Runs };
+                Workers { threads: cached.workers(threads), pin: false, sharing }
+            }
+        }
+    }
+
     /// Renders some tiles.
     fn pass<const W: usize>(
         &self,
@@ -194,20 +287,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
     ) where
         RayPacket<W>: PacketWidth<W>,
     {
-        let tuning = &self.settings.tuning;
-        let threads = tuning.worker_count();
-        let workers = match self.accel.cached() {
-            None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
-            // Some wait for their blocks while others are at work.
-            Some(cached) => {
-                // Where blocks have to go, tiles that are begun at about the same time are neighbours, so that they
-                // need the same ones. Where all have room, each worker has a part of the picture to itself, as
-                // in memory, and what is near it in its own caches.
-                let sharing = if cached.is_short() { Sharing::Queue } else { Sharing::Runs };
-                Workers { threads: cached.workers(threads), pin: false, sharing }
-            }
-        };
-        let outcome = workers.run(
+        let outcome = self.workers().run(
             jobs,
             || Scratch::<W>::new(self.learnt.take()),
             |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
@@ -241,6 +321,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
             tile_p99: quantile(&mut times, 0.99),
             threads,
             pinned: outcome.pinned,
+            samples: f64::from(self.settings.samples),
+            effects: EffectCosts::default(),
         }
     }
 }

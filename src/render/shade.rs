@@ -90,30 +90,15 @@ impl<'a, S: Surface> Shader<'a, S> {
     /// What a ray sees that hits nothing.
     #[inline]
     fn nothing(&self, ray: &Ray) -> Shade {
-        let (base, depth) = (self.sky(ray.direction), f32::INFINITY);
+        let (base, depth) = (self.lighting.ambient.sky(ray.direction), f32::INFINITY);
         Shade { base, key: Vec3::ZERO, shadow: None, depth, normal: Vec3::ZERO }
-    }
-
-    /// The sky in a direction: pale at the horizon, darker toward the zenith, grey below.
-    #[inline]
-    fn sky(&self, direction: Vec3) -> Vec3 {
-        const ZENITH: Vec3 = Vec3::new(0.18, 0.36, 0.68);
-        const HORIZON: Vec3 = Vec3::new(0.72, 0.8, 0.88);
-        const BELOW: Vec3 = Vec3::new(0.36, 0.35, 0.34);
-        let height = direction.dot(self.lighting.ambient.up) / direction.length();
-        if height >= 0.0 {
-            // The square root lets the colour change fast near the horizon.
-            HORIZON + (ZENITH - HORIZON) * height.sqrt()
-        } else {
-            HORIZON + (BELOW - HORIZON) * (-height * 8.0).min(1.0)
-        }
     }
 }
 
 /// The unit vector along a triangle's normal. Squares of very small and very large normals
 /// underflow and overflow, so it is brought to the size of 1 first.
 #[inline(always)]
-fn unit_normal(normal: Vec3, corners: [Vec3; 3]) -> Vec3 {
+pub(super) fn unit_normal(normal: Vec3, corners: [Vec3; 3]) -> Vec3 {
     let greatest = normal.abs().max_element();
     if greatest > f32::MIN_POSITIVE && greatest < f32::MAX {
         (normal / greatest).normalize()

@@ -1,5 +1,6 @@
 //! What a frame cost.
 
+use super::effects::EffectCosts;
 use serde::Serialize;
 use std::iter::Sum;
 use std::ops::AddAssign;
@@ -82,6 +83,11 @@ pub struct FrameStats {
     pub threads: usize,
     /// Workers that were bound to a processor.
     pub pinned: usize,
+    /// Samples per pixel, on average.
+    pub samples: f64,
+    /// What effects cost, if any ran.
+    #[serde(skip_serializing_if = "EffectCosts::is_empty")]
+    pub effects: EffectCosts,
 }
 
 #[cfg(test)]

@@ -79,6 +79,22 @@ impl Ambient {
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         self.ground + (self.sky - self.ground) * (0.5 + 0.5 * normal.dot(self.toward))
     }
+
+    /// What the sky looks like in a direction of any length: pale at the horizon, darker toward the zenith, grey
+    /// below.
+    #[inline]
+    pub fn sky(&self, direction: Vec3) -> Vec3 {
+        const ZENITH: Vec3 = Vec3::new(0.18, 0.36, 0.68);
+        const HORIZON: Vec3 = Vec3::new(0.72, 0.8, 0.88);
+        const BELOW: Vec3 = Vec3::new(0.36, 0.35, 0.34);
+        let height = direction.dot(self.up) / direction.length();
+        if height >= 0.0 {
+            // The square root lets the colour change fast near the horizon.
+            HORIZON + (ZENITH - HORIZON) * height.sqrt()
+        } else {
+            HORIZON + (BELOW - HORIZON) * (-height * 8.0).min(1.0)
+        }
+    }
 }
 
 /// All the light in a picture.

@@ -41,6 +41,8 @@ pub trait Surface: Sync {
 pub trait Look {
     /// A triangle's corners, and the reflectance where a hit's barycentrics are `u` and `v`: see [`Surface`].
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3);
+    /// The index of a triangle's material; 0 in scenes that have none.
+    fn material(&self, primitive: u32) -> u32;
     /// All that there is to know about a triangle.
     fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail;
 }

@@ -215,7 +215,8 @@ mod tests {
                     }
                 };
                 let expected: Vec<Hit> = rays.iter().map(first_there).collect();
-                let passed = rays.iter().zip(&expected).filter(|(ray, hit)| accel.intersect(ray) != **hit).count();
+                let passed =
+                    rays.iter().zip(&expected).filter(|(ray, hit)| accel.intersect(ray) != **hit).count();
                 assert!(passed > 100, "rays go through holes: {passed}");
                 let mut hits = vec![Hit::MISS; rays.len()];
                 accel.intersect_sifted(&Halves, &rays, &mut hits);

@@ -80,7 +80,14 @@ impl Bounce {
                 let weight = weight * shown(wo.dot(half)) * share;
                 // The lobe's width blurs what pictures show in it.
                 let spread = path.cone.spread + 0.25 * point.roughness;
-                self.send(path, point, sequence, Way::Glossy, (point.origin(false), toward, weight, spread), next);
+                self.send(
+                    path,
+                    point,
+                    sequence,
+                    Way::Glossy,
+                    (point.origin(false), toward, weight, spread),
+                    next,
+                );
             }
         }
         [weight * point.diffuse * (1.0 - reflectance.max_element()).max(0.0), Vec3::ZERO]
@@ -145,13 +152,27 @@ impl Bounce {
     }
 
     /// Sends off what goes straight on because the surface is only there in part.
-    pub fn through(&self, path: &Path, point: &Point<'_>, sequence: &Sequence, weight: Vec3, next: &mut Queues) {
+    pub fn through(
+        &self,
+        path: &Path,
+        point: &Point<'_>,
+        sequence: &Sequence,
+        weight: Vec3,
+        next: &mut Queues,
+    ) {
         let going = (point.origin_behind(), -point.toward, weight, path.cone.spread);
         self.send(path, point, sequence, Way::Through, going, next);
     }
 
     /// Looks for the light that other surfaces throw on this one.
-    pub fn diffuse(&self, path: &Path, point: &Point<'_>, sequence: &Sequence, matt: Vec3, next: &mut Queues) {
+    pub fn diffuse(
+        &self,
+        path: &Path,
+        point: &Point<'_>,
+        sequence: &Sequence,
+        matt: Vec3,
+        next: &mut Queues,
+    ) {
         let local = cosine_hemisphere(path.random(sequence, Use::Diffuse));
         let toward = Basis::of(point.normal).to_world(local);
         if point.face.dot(toward) <= 0.0 {

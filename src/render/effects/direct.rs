@@ -3,7 +3,7 @@
 use super::path::{Path, Use};
 use super::point::Point;
 use crate::geometry::Ray;
-use crate::render::scatter::{Sequence, cosine_hemisphere, Basis, ggx};
+use crate::render::scatter::{Basis, Sequence, cosine_hemisphere, ggx};
 use crate::scene::effects::{Effect, EffectSet, SMOOTH};
 use crate::scene::{Light, Lights, ShadowRay};
 use glam::Vec3;
@@ -117,6 +117,10 @@ impl Direct<'_> {
             return 0.0;
         }
         let basis = Basis::of(point.normal);
-        ggx::evaluate(basis.to_local(point.toward), basis.to_local(toward), point.roughness.max(SHARPEST.max(SMOOTH)))
+        ggx::evaluate(
+            basis.to_local(point.toward),
+            basis.to_local(toward),
+            point.roughness.max(SHARPEST.max(SMOOTH)),
+        )
     }
 }

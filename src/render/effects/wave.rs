@@ -249,7 +249,14 @@ impl<S: Surface> World<'_, S> {
             let start = Instant::now();
             waves.light_rays.clear();
             waves.light_rays.extend(waves.asked.iter().map(|&i| waves.lights[i].ray));
-            waves.tracer.occluded(self.accel, self.kernel, effect, &waves.light_rays, &waves.asked, &mut waves.occluded);
+            waves.tracer.occluded(
+                self.accel,
+                self.kernel,
+                effect,
+                &waves.light_rays,
+                &waves.asked,
+                &mut waves.occluded,
+            );
             waves.tallies.add(effect, waves.asked.len() as u64, start.elapsed());
         }
         self.see_through(waves);

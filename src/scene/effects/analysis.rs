@@ -50,14 +50,15 @@ const NAMED: usize = 3;
 
 impl Analysis {
     /// Looks at all materials that any triangle has, at the lights and at the camera.
-    pub fn new(
-        surface: &impl Surface,
-        around: &Around<'_>,
-        request: &Request,
-    ) -> Self {
+    pub fn new(surface: &impl Surface, around: &Around<'_>, request: &Request) -> Self {
         let uses = surface.uses();
-        let used: Vec<&Material> =
-            surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0).map(|(material, _)| material).collect();
+        let used: Vec<&Material> = surface
+            .materials()
+            .iter()
+            .zip(&uses)
+            .filter(|(_, uses)| **uses > 0)
+            .map(|(material, _)| material)
+            .collect();
         let mut effects: Vec<Call> = Vec::with_capacity(Effect::ALL.len());
         let by_materials = |calls: &dyn Fn(&Material) -> bool| -> Vec<String> {
             let callers: Vec<&Material> = used.iter().copied().filter(|material| calls(material)).collect();
@@ -65,14 +66,17 @@ impl Analysis {
         };
         for &effect in Effect::ALL {
             let called_for_by = match effect {
-                Effect::SmoothNormals if surface.has_attributes() => vec!["normals of the model's vertices".into()],
+                Effect::SmoothNormals if surface.has_attributes() => {
+                    vec!["normals of the model's vertices".into()]
+                }
                 Effect::Shadows => around.key_light.map(|light| vec![light.into()]).unwrap_or_default(),
                 Effect::Interreflection if around.lit_by_surfaces => {
                     vec!["all light comes from surfaces or from around".into()]
                 }
-                Effect::Environment => {
-                    around.environment.map(|picture| vec![format!("environment {picture}")]).unwrap_or_default()
-                }
+                Effect::Environment => around
+                    .environment
+                    .map(|picture| vec![format!("environment {picture}")])
+                    .unwrap_or_default(),
                 Effect::DepthOfField if around.camera.aperture > 0.0 => {
                     vec![format!("camera: aperture {}", around.camera.aperture)]
                 }
@@ -110,10 +114,14 @@ pub fn calls_for(material: &Material, effect: Effect) -> bool {
         }
         Effect::Bump => maps.bump.is_some() || maps.normal.is_some(),
         Effect::CutOuts => material.cutoff.is_some() && (maps.opacity.is_some() || material.opacity < 1.0),
-        Effect::Transparency => material.cutoff.is_none() && (maps.opacity.is_some() || material.opacity < 1.0),
+        Effect::Transparency => {
+            material.cutoff.is_none() && (maps.opacity.is_some() || material.opacity < 1.0)
+        }
         Effect::Emission | Effect::SoftShadows => material.emission.max_element() > 0.0,
         Effect::Highlights => is_specular && !material.reflects && !lets_light_in,
-        Effect::Reflection => (is_mirror || lets_light_in && material.ior != 1.0) && material.roughness < SMOOTH,
+        Effect::Reflection => {
+            (is_mirror || lets_light_in && material.ior != 1.0) && material.roughness < SMOOTH
+        }
         Effect::Glossy => is_mirror && material.roughness >= SMOOTH,
         Effect::Fresnel => material.fresnel && (is_mirror || lets_light_in),
         Effect::Refraction => lets_light_in,

@@ -60,9 +60,12 @@ impl FromStr for Request {
                     None => (None, word),
                 },
             };
-            let effect: Effect = name.parse().map_err(|()| wrong(format!("there is no \"{name}\"; {}", forms())))?;
+            let effect: Effect =
+                name.parse().map_err(|()| wrong(format!("there is no \"{name}\"; {}", forms())))?;
             if plain.replace(sign.is_none()).is_some_and(|before| before != sign.is_none()) {
-                return Err(wrong(format!("\"{text}\" mixes a list with changes by + and -; write one of both")));
+                return Err(wrong(format!(
+                    "\"{text}\" mixes a list with changes by + and -; write one of both"
+                )));
             }
             if request.on.or(request.off).has(effect) {
                 return Err(wrong(format!("{effect} is given twice")));

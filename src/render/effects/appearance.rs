@@ -1,0 +1,115 @@
+//! What a renderer needs to know to show effects.
+
+use super::bounce::Bounce;
+use super::direct::Direct;
+use super::holes::Holes;
+use super::point::Resolver;
+use super::wave::World;
+use crate::error::{Error, Result};
+use crate::scene::effects::{Effect, EffectSet, calls_for};
+use crate::scene::texture::Textures;
+use crate::scene::{Lights, Surface};
+use crate::traverse::{Accel, Kernel};
+
+/// The effects of a picture, and what they need beside the surfaces.
+#[derive(Debug)]
+pub struct Appearance {
+    /// The effects that run.
+    pub set: EffectSet,
+    /// Where light comes from.
+    pub lights: Lights,
+    /// The pictures on surfaces.
+    pub textures: Textures,
+    /// How far accuracy goes.
+    pub limits: Limits,
+}
+
+/// How accurate a picture is to be: more takes longer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Surfaces that a ray's light may have met before the one that the eye sees.
+    pub bounces: u32,
+    /// The standard error of a pixel's brightness, where black is 0 and white 1, at which no more samples are taken
+    /// of it; 0 takes as many as there may be.
+    pub error: f32,
+}
+
+/// The most bounces that make sense.
+const MAX_BOUNCES: u32 = 1024;
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { bounces: 8, error: 0.0 }
+    }
+}
+
+impl Limits {
+    /// Checks that they make sense.
+    ///
+    /// # Errors
+    /// [`Error::Option`] naming the first that does not.
+    pub fn check(&self) -> Result<()> {
+        if self.bounces > MAX_BOUNCES {
+            let message = format!("{} is not a number from 0 to {MAX_BOUNCES}", self.bounces);
+            return Err(Error::option("--bounces", message));
+        }
+        if !(0.0..1.0).contains(&self.error) {
+            let message = format!("{} is not a number from 0 to less than 1, such as 0.01", self.error);
+            return Err(Error::option("--error", message));
+        }
+        Ok(())
+    }
+}
+
+impl Appearance {
+    /// All that paths meet in a scene.
+    pub(crate) fn world<'a, S: Surface>(
+        &'a self,
+        accel: &'a Accel,
+        surface: &'a S,
+        kernel: Kernel,
+    ) -> World<'a, S> {
+        let Self { set, ref lights, ref textures, limits } = *self;
+        let bounds = accel.bounds();
+        let diagonal = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length() as f32;
+        let calls = |material| {
+            Effect::ALL
+                .iter()
+                .fold(EffectSet::NONE, |calls, &effect| calls.with(effect, calls_for(material, effect)))
+        };
+        let holes = if set.has(Effect::CutOuts) { Holes::new(surface, textures) } else { None };
+        World {
+            accel,
+            kernel,
+            surface,
+            resolver: Resolver {
+                materials: surface.materials(),
+                calls: surface.materials().iter().map(calls).collect(),
+                textures,
+                set,
+            },
+            direct: Direct { lights, set, reach: diagonal * REACH },
+            bounce: Bounce { set, limit: limits.bounces, lights_are_sampled: lights.emitters.is_some() },
+            holes,
+            set,
+        }
+    }
+}
+
+/// How far surfaces may be that take light from everywhere away, in diagonals of the scene.
+const REACH: f32 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absurd_limits_name_their_option() {
+        Limits::default().check().expect("good");
+        let wrong = |limits: Limits| limits.check().expect_err("absurd").to_string();
+        assert!(wrong(Limits { bounces: 2000, ..Limits::default() }).starts_with("--bounces: 2000"));
+        for error in [-0.1, 1.0, f32::NAN] {
+            assert!(wrong(Limits { error, ..Limits::default() }).starts_with("--error: "));
+        }
+    }
+}

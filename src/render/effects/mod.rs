@@ -1,0 +1,35 @@
+//! Pictures that show more than matt surfaces.
+//!
+//! A scene that calls for no [effects](crate::scene::effects) is rendered by the plain tile task, which knows
+//! nothing of them. Of one that does, a square of pixels is rendered by waves: all rays of a kind are traced together,
+//! what they hit is shaded by the least of four kernels that does all that these surfaces call for, and that
+//! makes the rays of the next wave. So a square in which nothing is shiny costs no reflection, in a scene full of mirrors
+//! too.
+//!
+//! | file | what is in it |
+//! |---|---|
+//! | `task` | tiles, squares, samples; when a pixel has enough of them |
+//! | `wave` | wave after wave: trace, shade, light |
+//! | `path` | a ray, and what has become of the light by the time it is where the ray is |
+//! | `trace` | which kernel gets which rays |
+//! | `point` | a place on a surface: normals, pictures |
+//! | `direct` | light straight from where it is made |
+//! | `bounce` | light that goes on: mirrors, glass, matt surfaces |
+//! | `holes` | where pictures cut holes into surfaces |
+//! | `cost` | rays and time by effect |
+
+mod appearance;
+mod bounce;
+mod cost;
+mod direct;
+mod holes;
+mod path;
+mod point;
+mod task;
+mod trace;
+mod wave;
+
+pub use appearance::{Appearance, Limits};
+pub use cost::EffectCosts;
+pub(super) use cost::Tallies;
+pub(super) use task::{EffectScratch, EffectTask};

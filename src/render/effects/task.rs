@@ -1,0 +1,232 @@
+//! Tiles of a picture that shows effects: their pixels in small squares, sample by sample.
+
+use super::path::{Path, Use, Way};
+use super::wave::{Seen, Waves, World};
+use crate::render::frame::TilePixels;
+use crate::render::sampling::subpixel;
+use crate::render::scatter::{Media, Sequence};
+use crate::render::tile::SQUARE;
+use crate::scene::effects::Effect;
+use crate::scene::texture::Cone;
+use crate::scene::{Surface, View};
+use crate::traverse::Dispatch;
+use glam::Vec3;
+use std::time::Instant;
+
+/// All that rendering a tile with effects reads.
+pub struct EffectTask<'a, S> {
+    pub world: World<'a, S>,
+    pub view: View,
+    /// Samples per pixel, at most.
+    pub samples: u32,
+    /// The standard error of a pixel's brightness, as displays show it from 0 to 1, at which it has samples enough;
+    /// 0 takes all of them.
+    pub error: f32,
+}
+
+/// Samples that a pixel gets before its error is guessed: fewer would agree by chance too often.
+const LEAST: u32 = 8;
+
+/// What a worker keeps from tile to tile.
+#[derive(Debug, Default)]
+pub struct EffectScratch {
+    pub waves: Waves,
+    /// Samples taken.
+    pub samples: u64,
+    /// Seconds that each tile took, waiting included.
+    pub tiles: Vec<f32>,
+    paths: Vec<Path>,
+    /// Light of the sample at hand, and of all so far.
+    sample: Vec<Vec3>,
+    sums: Vec<Vec3>,
+    /// Of the brightness so far: its mean, and the sum of squared differences from it.
+    spread: Vec<[f32; 2]>,
+    /// Pixels that want more samples, in the order in which they are traced.
+    wanting: Vec<u16>,
+    taken: Vec<u32>,
+    seen: Seen,
+}
+
+impl EffectScratch {
+    /// Empty, with what has been learnt before about kernels.
+    pub fn new(learnt: Dispatch) -> Self {
+        Self { waves: Waves::new(learnt), ..Self::default() }
+    }
+}
+
+impl<S: Surface> EffectTask<'_, S> {
+    /// Renders a tile into its pixels.
+    pub fn render(&self, scratch: &mut EffectScratch, mut pixels: TilePixels<'_>) {
+        let start = Instant::now();
+        let tile = pixels.tile;
+        for y in (0..tile.height).step_by(SQUARE as usize) {
+            for x in (0..tile.width).step_by(SQUARE as usize) {
+                let _session = self.world.accel.cached().map(|cached| cached.session());
+                self.square(scratch, &mut pixels, [x, y]);
+            }
+        }
+        scratch.tiles.push(start.elapsed().as_secs_f32());
+    }
+
+    /// Renders the square of a tile at a place in it.
+    fn square(&self, scratch: &mut EffectScratch, pixels: &mut TilePixels<'_>, [x, y]: [u32; 2]) {
+        let tile = pixels.tile;
+        let [width, height] = [SQUARE.min(tile.width - x), SQUARE.min(tile.height - y)];
+        let count = (width * height) as usize;
+        let in_picture = |pixel: u16| {
+            let pixel = u32::from(pixel);
+            [tile.x + x + pixel % width, tile.y + y + pixel / width]
+        };
+        scratch.begin(count);
+        scratch.wanting.extend(in_blocks(width, height));
+
+        for sample in 0..self.samples {
+            self.camera_paths(scratch, sample, &in_picture);
+            scratch.sample.fill(Vec3::ZERO);
+            let EffectScratch { waves, paths, sample: light, seen, .. } = scratch;
+            let seen = (sample == 0).then_some(seen);
+            self.world.run(waves, paths, |pixel| Sequence::of(in_picture(pixel), sample), light, seen);
+            scratch.take(self.error, sample + 1);
+            if scratch.wanting.is_empty() {
+                break;
+            }
+        }
+
+        for pixel in 0..count {
+            let place = ((y + pixel as u32 / width) * tile.width + x + pixel as u32 % width) as usize;
+            pixels.color[place] = (scratch.sums[pixel] / scratch.taken[pixel].max(1) as f32).to_array();
+            let (depth, normal) = scratch.seen[pixel].unwrap_or((f32::INFINITY, Vec3::ZERO));
+            if let Some(to) = pixels.depth.get_mut(place) {
+                *to = depth;
+            }
+            if let Some(to) = pixels.normal.get_mut(place) {
+                *to = normal.to_array();
+            }
+        }
+    }
+
+    /// A path from the camera for each pixel that wants one.
+    fn camera_paths(&self, scratch: &mut EffectScratch, sample: u32, in_picture: &impl Fn(u16) -> [u32; 2]) {
+        let has_lens = self.world.set.has(Effect::DepthOfField);
+        let spread = self.view.pixel_spread();
+        scratch.paths.clear();
+        for &pixel in &scratch.wanting {
+            let [x, y] = in_picture(pixel);
+            let mut path = Path {
+                pixel,
+                cone: Cone::new(spread),
+                ..Path::of_ray(self.view.ray(x, y, subpixel(sample)))
+            };
+            if has_lens {
+                let lens = path.random(&Sequence::of([x, y], sample), Use::Lens);
+                path.ray = self.view.lens_ray(x, y, subpixel(sample), lens);
+            }
+            scratch.paths.push(path);
+        }
+        scratch.samples += scratch.paths.len() as u64;
+    }
+}
+
+impl EffectScratch {
+    /// Forgets the square before.
+    fn begin(&mut self, count: usize) {
+        self.sample.clear();
+        self.sample.resize(count, Vec3::ZERO);
+        self.sums.clear();
+        self.sums.resize(count, Vec3::ZERO);
+        self.spread.clear();
+        self.spread.resize(count, [0.0; 2]);
+        self.taken.clear();
+        self.taken.resize(count, 0);
+        self.seen.clear();
+        self.seen.resize(count, None);
+        self.wanting.clear();
+    }
+
+    /// Adds the sample at hand, of so many that there are now, and lets pixels go whose error is small enough.
+    fn take(&mut self, error: f32, count: u32) {
+        for &pixel in &self.wanting {
+            let pixel = usize::from(pixel);
+            let light = self.sample[pixel];
+            self.sums[pixel] += light;
+            self.taken[pixel] = count;
+            // Welford's running mean and sum of squares.
+            let [mean, squares] = &mut self.spread[pixel];
+            let before = brightness(light) - *mean;
+            *mean += before / count as f32;
+            *squares += before * (brightness(light) - *mean);
+        }
+        if error > 0.0 && count >= LEAST {
+            let spread = &self.spread;
+            self.wanting.retain(|&pixel| {
+                let [_, squares] = spread[usize::from(pixel)];
+                let variance = squares / (count - 1) as f32;
+                variance > error * error * count as f32
+            });
+        }
+    }
+}
+
+/// How bright light looks on a display, 0 to 1: about its square root. Brighter than white is white.
+fn brightness(light: Vec3) -> f32 {
+    light.dot(Vec3::new(0.2126, 0.7152, 0.0722)).clamp(0.0, 1.0).sqrt()
+}
+
+/// The pixels of a square, numbered in rows, in the order of the blocks of 4 x 4 that packets are made of.
+fn in_blocks(width: u32, height: u32) -> impl Iterator<Item = u16> {
+    const SIDE: usize = 4;
+    (0..height).step_by(SIDE).flat_map(move |top| {
+        (0..width).step_by(SIDE).flat_map(move |left| {
+            let rows = top..height.min(top + SIDE as u32);
+            rows.flat_map(move |y| (left..width.min(left + SIDE as u32)).map(move |x| (y * width + x) as u16))
+        })
+    })
+}
+
+impl Path {
+    /// A ray from the camera, of no width.
+    pub fn of_ray(ray: crate::geometry::Ray) -> Self {
+        Self {
+            ray,
+            pixel: 0,
+            depth: 0,
+            way: Way::Camera,
+            sees_lights: true,
+            branch: 0,
+            weight: Vec3::ONE,
+            cone: Cone::new(0.0),
+            media: Media::OUTSIDE,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_hold_each_pixel_once() {
+        for (width, height) in [(16, 16), (1, 1), (5, 3), (16, 2)] {
+            let mut pixels: Vec<u16> = in_blocks(width, height).collect();
+            if width == 16 && height == 16 {
+                assert_eq!(pixels[..5], [0, 1, 2, 3, 16]);
+                assert_eq!(pixels[16], 4);
+            }
+            pixels.sort_unstable();
+            assert!(pixels.iter().copied().eq(0..(width * height) as u16));
+        }
+    }
+
+    #[test]
+    fn pixels_that_agree_with_themselves_want_no_more() {
+        let mut scratch = EffectScratch::default();
+        scratch.begin(2);
+        scratch.wanting.extend([0, 1]);
+        for count in 1..=LEAST {
+            scratch.sample = vec![Vec3::splat(0.5), Vec3::splat((count % 2) as f32)];
+            scratch.take(0.01, count);
+        }
+        assert_eq!(scratch.wanting, [1]);
+        assert_eq!((scratch.taken[0], scratch.sums[0]), (LEAST, Vec3::splat(0.5 * LEAST as f32)));
+    }
+}
