@@ -69,6 +69,7 @@ impl Scene {
             cast_slice(pages).to_vec(),
             cast_slice(triangles).to_vec(),
             Vec::new(),
+            Vec::new(),
         ];
         InMemory { arrays, ..InMemory::default() }
     }

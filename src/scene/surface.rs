@@ -87,7 +87,7 @@ impl Look for &Stored {
             corners: self.corners(primitive),
             color: self.color(primitive, u, v),
             material: self.material(primitive),
-            attributes: Attributes::NONE,
+            attributes: self.attributes(primitive),
         }
     }
 }
@@ -249,10 +249,7 @@ impl Surface for Mesh {
     }
 
     fn materials(&self) -> &[Material] {
-        match &self.colors {
-            Colors::PerMaterial { materials, .. } => materials,
-            _ => &[],
-        }
+        self.colors.materials()
     }
 
     fn images(&self) -> &[Image] {
@@ -264,19 +261,11 @@ impl Surface for Mesh {
     }
 
     fn uses(&self) -> Vec<u64> {
-        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
-        let mut uses = vec![0; materials.len()];
-        of_triangle.iter().for_each(|&material| uses[material as usize] += 1);
-        uses
+        self.colors.uses()
     }
 
     fn emitters(&self) -> Vec<u32> {
-        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
-        let emits: Vec<bool> = materials.iter().map(|material| material.emission != Vec3::ZERO).collect();
-        if !emits.contains(&true) {
-            return Vec::new();
-        }
-        (0..).zip(of_triangle).filter(|&(_, &material)| emits[material as usize]).map(|(i, _)| i).collect()
+        self.colors.emitters()
     }
 }
 
@@ -304,22 +293,22 @@ impl Surface for Stored {
     }
 
     fn materials(&self) -> &[Material] {
-        &[]
+        self.materials()
     }
 
     fn images(&self) -> &[Image] {
-        &[]
+        self.images()
     }
 
     fn has_attributes(&self) -> bool {
-        false
+        self.has_attributes()
     }
 
     fn uses(&self) -> Vec<u64> {
-        Vec::new()
+        self.uses().to_vec()
     }
 
     fn emitters(&self) -> Vec<u32> {
-        Vec::new()
+        self.emitters().to_vec()
     }
 }
