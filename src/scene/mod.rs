@@ -3,6 +3,7 @@
 //! [`Camera`] says where the eye is; [`View`] makes its rays for one image size; [`Orbit`] moves
 //! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on.
 
+mod cached;
 mod camera;
 mod framing;
 mod light;
@@ -11,8 +12,9 @@ mod path;
 mod surface;
 mod view;
 
+pub use cached::{CachedReader, CachedSurface};
 pub use camera::{Camera, DEFAULT_FOV};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use path::Orbit;
-pub use surface::{CachedReader, CachedSurface, Detail, Look, Surface};
+pub use surface::{Detail, Look, Surface};
 pub use view::View;
