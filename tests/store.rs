@@ -105,7 +105,8 @@ fn build_says_what_it_did() {
     assert_eq!(said["build_params"]["preset"], "best");
     assert_eq!(said["models"][0]["read_report"]["polygons"], 1);
     assert!(said["tree"]["nodes"].as_u64() > Some(0) && said["build_seconds"].as_f64() > Some(0.0));
-    assert_eq!(said["sections"][0]["kind"], "meta");
+    let sections = said["sections"].as_array().expect("a list");
+    assert!(sections.iter().any(|section| section["kind"] == "meta"), "{sections:?}");
 }
 
 #[test]

@@ -428,7 +428,7 @@ mod tests {
     /// should be, in a cache that is much too small for all.
     fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
         const BLOCKS: usize = 60;
-        let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0], BLOCK);
+        let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
         let most = 3;
         let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
         let (blocks, loaders) =

@@ -35,6 +35,7 @@ fn section(file: &store::File, array: Array) -> Option<&store::Section> {
         Array::Pages => &[Kind::Pages],
         Array::Triangles => &[Kind::Triangles],
         Array::Colors => &[Kind::TriangleColors, Kind::CornerColors, Kind::MaterialOfTriangle],
+        Array::Surfaces => &[Kind::SurfaceRecords],
     };
     kinds.iter().find_map(|&kind| file.section(kind))
 }
@@ -134,7 +135,8 @@ impl Cached {
     }
 
     /// The scene in a file, of which as much is in memory as `memory` bytes hold, everything counted that
-    /// the scene takes, and `beside` for what else is to be held in them. For `threads` at work.
+    /// the scene takes, its materials and the list of what gives off light included, and `beside` for what else is
+    /// to be held in them. For `threads` at work.
     ///
     /// # Errors
     /// The file's upper tree is damaged, or as [`Cached::new`].
@@ -157,7 +159,7 @@ impl Cached {
             bytes: Array::ALL.map(|array| section(file, array).map_or(0, |section| section.bytes as usize)),
             spread: meta.spread,
         };
-        let beside = beside + FileSource::bytes(file);
+        let beside = beside + FileSource::bytes(file) + file.surface_bytes();
         let source = Box::new(FileSource::new(file, options.direct)?);
         Self::new(resident, source, options, memory, beside, threads)
     }

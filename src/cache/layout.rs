@@ -13,13 +13,16 @@ pub enum Array {
     Pages,
     /// Triangle records.
     Triangles,
-    /// What colour each triangle has.
+    /// What colour each triangle has, or which material.
     Colors,
+    /// Which material each triangle has, and what its corners have: in scenes with attributes.
+    Surfaces,
 }
 
 impl Array {
     /// All of them, in the order of their blocks: nodes before what leaves need.
-    pub const ALL: [Self; 5] = [Self::Nodes, Self::References, Self::Pages, Self::Triangles, Self::Colors];
+    pub const ALL: [Self; 6] =
+        [Self::Nodes, Self::References, Self::Pages, Self::Triangles, Self::Colors, Self::Surfaces];
 
     /// What messages call it.
     pub const fn name(self) -> &'static str {
@@ -29,6 +32,7 @@ impl Array {
             Self::Pages => "pages",
             Self::Triangles => "triangles",
             Self::Colors => "colours",
+            Self::Surfaces => "surface records",
         }
     }
 }
@@ -118,9 +122,9 @@ mod tests {
 
     #[test]
     fn every_byte_is_in_one_block() {
-        let layout = Layout::new([5000, 0, 4096, 1, 12_288], 4096);
+        let layout = Layout::new([5000, 0, 4096, 1, 12_288, 40], 4096);
         let found: Vec<_> = (0..layout.blocks() as u32).map(|block| layout.locate(block)).collect();
-        use Array::{Colors, Nodes, Pages, Triangles};
+        use Array::{Colors, Nodes, Pages, Surfaces, Triangles};
         let expected = [
             (Nodes, 0, 4096),
             (Nodes, 4096, 904),
@@ -129,9 +133,10 @@ mod tests {
             (Colors, 0, 4096),
             (Colors, 4096, 4096),
             (Colors, 8192, 4096),
+            (Surfaces, 0, 40),
         ];
         assert_eq!(found, expected);
-        assert_eq!(layout.bytes(), 5000 + 4096 + 1 + 12_288);
+        assert_eq!(layout.bytes(), 5000 + 4096 + 1 + 12_288 + 40);
         assert_eq!(layout.first_of_leaves(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! A scene of which only a part is in memory.
 //!
-//! The upper tree is resident (a hundredth of the data). Nodes, lists of primitives, triangles and colours lie
-//! in a file and come in *blocks* when a walk is about to look at them: the kernels say so beforehand
+//! The upper tree is resident (a hundredth of the data). Nodes, lists of primitives, triangles and what shading asks
+//! about them lie in a file and come in *blocks* when a walk is about to look at them: the kernels say so beforehand
 //! ([`Tree::enter`](crate::kdtree::Tree::enter)), and a [`View`] of the tree sees to it that the blocks are here.
 //! For a resident tree that call is empty: the kernels are compiled for each.
 //!

@@ -69,6 +69,7 @@ impl Scene {
             cast_slice(pages).to_vec(),
             cast_slice(triangles).to_vec(),
             Vec::new(),
+            Vec::new(),
         ];
         InMemory { arrays, ..InMemory::default() }
     }
@@ -323,7 +324,7 @@ fn colors_of_all_kinds_come_from_files_as_they_were() {
         let file = crate::store::File::open(&path).expect("opens");
         let cached = Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 2).expect("enough");
         let cached = Arc::new(cached);
-        let surface = CachedSurface::new(Arc::clone(&cached), &file);
+        let surface = CachedSurface::new(Arc::clone(&cached), &file).expect("whole");
         let frame = frame_of(&Accel::of_cached(cached), &surface, &scene.resident).expect("can be read");
         assert!(frame == expected, "{:?}", file.meta().colors);
     }

@@ -180,11 +180,12 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Some bytes of the colours, entered and copied.
-    pub fn color_bytes<const N: usize>(&self, first: usize) -> [u8; N] {
-        let colors: Part<u8> = Part::new(&self.cached.blocks, Array::Colors);
-        self.enter_elements(&colors, first..first + N);
-        *self.slice(&colors, first..first + N).first_chunk().expect("as many as asked for")
+    /// Some bytes of an array, entered and copied. Panics if they are out of range.
+    pub fn bytes<const N: usize>(&self, array: Array, first: usize) -> [u8; N] {
+        let part: Part<u8> = Part::new(&self.cached.blocks, array);
+        assert!(first + N <= part.count, "{} has {} bytes", array.name(), part.count);
+        self.enter_elements(&part, first..first + N);
+        *self.slice(&part, first..first + N).first_chunk().expect("as many as asked for")
     }
 
     /// All that this thread has waited so far.

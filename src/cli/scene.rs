@@ -154,7 +154,7 @@ impl Scene {
         let start = Instant::now();
         let cached = Arc::new(Cached::open(file, options, memory, beside + taken_so_far(), threads)?);
         let accel = Accel::of_cached(Arc::clone(&cached)).with_isa(isa);
-        let looks = Looks::Cached(CachedSurface::new(cached, file));
+        let looks = Looks::Cached(CachedSurface::new(cached, file)?);
         Ok(Self::of_file(file, accel, file.meta().stats.clone(), looks, start.elapsed().as_secs_f64()))
     }
 

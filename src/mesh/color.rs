@@ -29,6 +29,32 @@ impl Default for Colors {
 }
 
 impl Colors {
+    /// The materials; none if colours are of another kind.
+    pub fn materials(&self) -> &[Material] {
+        match self {
+            Self::PerMaterial { materials, .. } => materials,
+            _ => &[],
+        }
+    }
+
+    /// How many triangles each of the materials has. Panics if a triangle has one that is not there.
+    pub fn uses(&self) -> Vec<u64> {
+        let Self::PerMaterial { materials, of_triangle } = self else { return Vec::new() };
+        let mut uses = vec![0; materials.len()];
+        of_triangle.iter().for_each(|&material| uses[material as usize] += 1);
+        uses
+    }
+
+    /// The triangles whose material gives off light, in the order of their numbers. Panics likewise.
+    pub fn emitters(&self) -> Vec<u32> {
+        let Self::PerMaterial { materials, of_triangle } = self else { return Vec::new() };
+        let emits: Vec<bool> = materials.iter().map(Material::emits).collect();
+        if !emits.contains(&true) {
+            return Vec::new();
+        }
+        (0..).zip(of_triangle).filter(|&(_, &material)| emits[material as usize]).map(|(i, _)| i).collect()
+    }
+
     /// Bytes of memory that the colours take up.
     pub(super) fn bytes(&self) -> usize {
         match self {

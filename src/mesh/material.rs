@@ -2,8 +2,6 @@
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
-use std::sync::Arc;
 
 /// A surface. Colours are linear RGB; shares of light are 0 to 1.
 ///
@@ -107,38 +105,6 @@ pub enum Channel {
     Grey,
 }
 
-/// A picture that materials name. It is opened when something that is drawn calls for it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// What messages call it.
-    pub name: String,
-    /// Where it is.
-    pub source: ImageSource,
-}
-
-impl Image {
-    /// Bytes of memory that it takes up while it is not opened.
-    pub(super) fn bytes(&self) -> usize {
-        let source = match &self.source {
-            ImageSource::File(path) => path.as_os_str().len(),
-            ImageSource::Bytes(bytes) => bytes.len(),
-            ImageSource::Missing(why) => why.len(),
-        };
-        self.name.len() + source + size_of::<Self>()
-    }
-}
-
-/// Where a picture is.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ImageSource {
-    /// In a file of its own.
-    File(PathBuf),
-    /// In a model's file: the bytes of a picture file.
-    Bytes(Arc<[u8]>),
-    /// Nowhere: this is what is wrong. One plain colour takes its place.
-    Missing(String),
-}
-
 /// The reflectance of what no file gives a colour.
 pub(super) const DEFAULT_DIFFUSE: Vec3 = Vec3::splat(0.7);
 
@@ -168,6 +134,11 @@ impl Material {
     /// A matt surface.
     pub fn matt(name: impl Into<String>, diffuse: Vec3) -> Self {
         Self { name: name.into(), diffuse, ..Self::default() }
+    }
+
+    /// Whether it gives off light.
+    pub fn emits(&self) -> bool {
+        self.emission != Vec3::ZERO
     }
 
     /// What in it is no material, if anything: a NaN, a share of light that is less than nothing or more than all.

@@ -7,6 +7,7 @@ mod attributes;
 mod check;
 mod color;
 pub mod generate;
+mod image;
 mod join;
 mod lists;
 mod material;
@@ -20,7 +21,8 @@ pub use attributes::{Attributes, Normal};
 pub use check::MAX_TRIANGLES;
 pub use color::{Colors, linear_to_srgb, srgb_to_linear};
 pub(crate) use color::{blend, decode};
-pub use material::{Channel, Image, ImageSource, Map, Maps, Material};
+pub use image::{Image, ImageSource, MAX_IMAGE_BYTES, Packed};
+pub use material::{Channel, Map, Maps, Material};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
 pub use shape::{DECADES, Shapes};
 

@@ -4,6 +4,7 @@
 //! it; [`Lighting`] is the light that falls on the scene, [`Environment`] that from infinitely far;
 //! [`Surface`] is what it falls on, [`texture`] the pictures there.
 
+mod cached;
 mod camera;
 pub mod effects;
 mod emitters;
@@ -17,11 +18,12 @@ mod surface;
 pub mod texture;
 mod view;
 
+pub use cached::{CachedReader, CachedSurface};
 pub use camera::{Camera, DEFAULT_FOV};
 pub use emitters::{EmitterSample, Emitters};
 pub use environment::{Environment, EnvironmentSample};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use lights::Lights;
 pub use path::Orbit;
-pub use surface::{CachedReader, CachedSurface, Detail, Look, Surface};
+pub use surface::{Detail, Look, Surface};
 pub use view::View;

@@ -1,9 +1,10 @@
 //! What shading asks of the triangles that rays hit.
 
-use crate::cache::{Cached, View};
+use crate::cache::{Array, Cached, View};
+use crate::error::Result;
 use crate::kdtree::Tree;
-use crate::mesh::{Attributes, Colors, Image, Material, Mesh, blend, decode};
-use crate::store::{self, ColorMeta, Stored};
+use crate::mesh::{Attributes, Image, Material, Mesh, blend, decode};
+use crate::store::{self, ColorMeta, Stored, SurfaceRecord};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -89,141 +90,8 @@ impl Look for &Stored {
             corners: self.corners(primitive),
             color: self.color(primitive, u, v),
             material: self.material(primitive),
-            attributes: Attributes::NONE,
+            attributes: self.attributes(primitive),
         }
-    }
-}
-
-/// The surfaces of a scene that is not all in memory.
-#[derive(Debug)]
-pub struct CachedSurface {
-    cached: Arc<Cached>,
-    paint: CachedPaint,
-}
-
-/// Where its colours are.
-#[derive(Debug)]
-enum CachedPaint {
-    /// One for everything.
-    Uniform(Vec3),
-    /// Three bytes a triangle.
-    PerTriangle,
-    /// Nine bytes a triangle.
-    PerCorner,
-    /// The index of a material a triangle, four bytes.
-    PerMaterial(Vec<Vec3>),
-}
-
-impl CachedSurface {
-    /// The surfaces of a file of which `cached` has a part in memory.
-    pub fn new(cached: Arc<Cached>, file: &store::File) -> Self {
-        let paint = match &file.meta().colors {
-            ColorMeta::Uniform { color } => CachedPaint::Uniform((*color).into()),
-            ColorMeta::PerTriangle => CachedPaint::PerTriangle,
-            ColorMeta::PerVertex => CachedPaint::PerCorner,
-            ColorMeta::PerMaterial { materials } => {
-                CachedPaint::PerMaterial(materials.iter().map(|material| material.diffuse).collect())
-            }
-        };
-        Self { cached, paint }
-    }
-
-    #[inline]
-    fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
-        view.enter_triangle(primitive);
-        let corners = view.corners(primitive);
-        let scale = self.cached.scale();
-        if scale.is_none() { *corners } else { scale.undo(corners) }.map(Vec3::from_array)
-    }
-
-    #[inline]
-    fn color_in(&self, view: &View<'_>, primitive: u32, u: f32, v: f32) -> Vec3 {
-        let at = |bytes: usize| primitive as usize * bytes;
-        match &self.paint {
-            CachedPaint::Uniform(color) => *color,
-            CachedPaint::PerTriangle => decode(view.color_bytes::<3>(at(3))),
-            CachedPaint::PerCorner => {
-                let [a, b, c, d, e, f, g, h, i] = view.color_bytes::<9>(at(9));
-                blend([[a, b, c], [d, e, f], [g, h, i]], u, v)
-            }
-            CachedPaint::PerMaterial(diffuse) => {
-                diffuse[material_in(view, primitive) as usize % diffuse.len()]
-            }
-        }
-    }
-}
-
-fn material_in(view: &View<'_>, primitive: u32) -> u32 {
-    u32::from_le_bytes(view.color_bytes(primitive as usize * 4))
-}
-
-/// Surfaces that are not all in memory, through the eyes of one thread: it has its place among the readers once
-/// for all that it looks at.
-#[derive(Debug)]
-pub struct CachedReader<'a> {
-    surface: &'a CachedSurface,
-    view: View<'a>,
-}
-
-impl Look for CachedReader<'_> {
-    #[inline]
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
-        let Self { surface, view } = self;
-        (surface.corners_in(view, primitive), surface.color_in(view, primitive, u, v))
-    }
-
-    #[inline]
-    fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
-        let (corners, color) = self.look(primitive, u, v);
-        let material = match &self.surface.paint {
-            CachedPaint::PerMaterial(_) => material_in(&self.view, primitive),
-            _ => 0,
-        };
-        Detail { corners, color, material, attributes: Attributes::NONE }
-    }
-}
-
-impl Surface for CachedSurface {
-    type Reader<'a> = CachedReader<'a>;
-
-    #[inline]
-    fn reader(&self) -> CachedReader<'_> {
-        CachedReader { surface: self, view: self.cached.view() }
-    }
-
-    fn corners(&self, primitive: u32) -> [Vec3; 3] {
-        self.corners_in(&self.cached.view(), primitive)
-    }
-
-    fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
-        self.color_in(&self.cached.view(), primitive, u, v)
-    }
-
-    fn material(&self, primitive: u32) -> u32 {
-        match &self.paint {
-            CachedPaint::PerMaterial(_) => material_in(&self.cached.view(), primitive),
-            _ => 0,
-        }
-    }
-
-    fn materials(&self) -> &[Material] {
-        &[]
-    }
-
-    fn images(&self) -> &[Image] {
-        &[]
-    }
-
-    fn has_attributes(&self) -> bool {
-        false
-    }
-
-    fn uses(&self) -> Vec<u64> {
-        Vec::new()
-    }
-
-    fn emitters(&self) -> Vec<u32> {
-        Vec::new()
     }
 }
 
@@ -251,10 +119,7 @@ impl Surface for Mesh {
     }
 
     fn materials(&self) -> &[Material] {
-        match &self.colors {
-            Colors::PerMaterial { materials, .. } => materials,
-            _ => &[],
-        }
+        self.colors.materials()
     }
 
     fn images(&self) -> &[Image] {
@@ -266,19 +131,11 @@ impl Surface for Mesh {
     }
 
     fn uses(&self) -> Vec<u64> {
-        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
-        let mut uses = vec![0; materials.len()];
-        of_triangle.iter().for_each(|&material| uses[material as usize] += 1);
-        uses
+        self.colors.uses()
     }
 
     fn emitters(&self) -> Vec<u32> {
-        let Colors::PerMaterial { materials, of_triangle } = &self.colors else { return Vec::new() };
-        let emits: Vec<bool> = materials.iter().map(|material| material.emission != Vec3::ZERO).collect();
-        if !emits.contains(&true) {
-            return Vec::new();
-        }
-        (0..).zip(of_triangle).filter(|&(_, &material)| emits[material as usize]).map(|(i, _)| i).collect()
+        self.colors.emitters()
     }
 }
 
@@ -306,22 +163,22 @@ impl Surface for Stored {
     }
 
     fn materials(&self) -> &[Material] {
-        &[]
+        self.materials()
     }
 
     fn images(&self) -> &[Image] {
-        &[]
+        self.images()
     }
 
     fn has_attributes(&self) -> bool {
-        false
+        self.has_attributes()
     }
 
     fn uses(&self) -> Vec<u64> {
-        Vec::new()
+        self.uses().to_vec()
     }
 
     fn emitters(&self) -> Vec<u32> {
-        Vec::new()
+        self.emitters().to_vec()
     }
 }

@@ -5,7 +5,7 @@ use super::section::{ENTRY, Entry};
 use bytemuck::{Pod, Zeroable};
 
 /// The format's version. A reader takes its own and no other.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// What every scene file begins with. A transfer that takes it for text does not leave it as it is: the first
 /// byte is above 127, and both kinds of line end and the old end-of-file mark follow.
@@ -93,11 +93,17 @@ impl Header {
         if header.endianness == ENDIANNESS.swap_bytes() {
             return Err("it was written in the other byte order (big-endian); build it again here".into());
         }
-        if header.endianness == ENDIANNESS && header.version > VERSION {
-            let version = header.version;
+        let version = header.version;
+        if header.endianness == ENDIANNESS && version > VERSION {
             return Err(format!(
                 "it has version {version} of the format, and this raypack reads version {VERSION}: use a newer \
                  raypack, or build it again with this one"
+            ));
+        }
+        if header.endianness == ENDIANNESS && (1..VERSION).contains(&version) {
+            return Err(format!(
+                "it has version {version} of the format, of an older raypack, and this one reads version \
+                 {VERSION}: build it again"
             ));
         }
         block[TABLE - size_of::<u64>()..TABLE].fill(0);

@@ -15,8 +15,7 @@ const TREE: [Kind; 7] =
     [Kind::Nodes, Kind::References, Kind::Upper, Kind::Beneath, Kind::Pages, Kind::Lines, Kind::Triangles];
 
 /// The sections that the mesh lies in.
-const MESH: [Kind; 5] =
-    [Kind::Positions, Kind::Indices, Kind::TriangleColors, Kind::VertexColors, Kind::MaterialOfTriangle];
+const MESH: [Kind; 4] = [Kind::Positions, Kind::Indices, Kind::TriangleColors, Kind::VertexColors];
 
 impl File {
     /// The tree, mapped: nothing is copied. Checks the checksums of its sections first, unless that was done.
@@ -58,11 +57,11 @@ impl File {
         }
     }
 
-    /// A copy of the mesh. Checks the checksums of its sections first, unless that was done, and that it is a
+    /// A copy of the mesh, its pictures' files included. Checks the checksums of its sections first, unless that was done, and that it is a
     /// mesh.
     ///
     /// # Errors
-    /// A section is damaged, an index is out of range, or a vertex is not finite.
+    /// A section is damaged, an index is out of range, or a vertex or a texture coordinate is not finite.
     pub fn mesh(&self) -> Result<Mesh> {
         self.verify_sections(&MESH)?;
         let positions: Column<Vec3> = self.column(Kind::Positions);
@@ -82,19 +81,15 @@ impl File {
             ColorMeta::PerTriangle => Colors::PerTriangle(self.column(Kind::TriangleColors).to_vec()),
             ColorMeta::PerVertex => Colors::PerVertex(self.column(Kind::VertexColors).to_vec()),
             ColorMeta::PerMaterial { materials } => {
-                let of_triangle = self.material_of_triangle(materials.len())?.to_vec();
-                Colors::PerMaterial { materials: materials.clone(), of_triangle }
+                Colors::PerMaterial { materials: materials.clone(), of_triangle: self.substances()?.to_vec() }
             }
         };
-        Ok(Mesh { positions: positions.to_vec(), triangles: triangles.to_vec(), colors, ..Mesh::default() })
-    }
-
-    /// Each triangle's material, of so many that there are. Its checksums must have been checked.
-    pub(super) fn material_of_triangle(&self, materials: usize) -> Result<Column<u32>> {
-        let of_triangle: Column<u32> = self.column(Kind::MaterialOfTriangle);
-        if of_triangle.par_iter().any(|&material| material as usize >= materials) {
-            return Err(Error::malformed(self.path(), "a triangle has a material that is not there"));
-        }
-        Ok(of_triangle)
+        Ok(Mesh {
+            positions: positions.to_vec(),
+            triangles: triangles.to_vec(),
+            colors,
+            attributes: self.records()?.par_iter().map(|record| record.attributes).collect(),
+            images: self.copied_images()?,
+        })
     }
 }

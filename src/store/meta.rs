@@ -2,7 +2,7 @@
 
 use crate::geometry::Aabb;
 use crate::kdtree::{BuildParams, KdTree, SPREAD_BLOCKS, Scale, Tree, TreeStats};
-use crate::mesh::{Colors, Material, Mesh};
+use crate::mesh::{Colors, MAX_IMAGE_BYTES, Material, Mesh};
 use serde::{Deserialize, Serialize};
 
 /// What writes files.
@@ -38,6 +38,34 @@ pub struct Meta {
     pub spread: [usize; SPREAD_BLOCKS.len()],
     /// Where colours come from.
     pub colors: ColorMeta,
+    /// How many triangles each of the materials has; empty if there are none.
+    pub uses: Vec<u64>,
+    /// Whether triangles have texture coordinates or normals: in the section `surface-records`.
+    pub attributes: bool,
+    /// The pictures that materials name, in the order of their numbers.
+    pub images: Vec<ImageMeta>,
+}
+
+/// A picture that materials name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ImageMeta {
+    /// Its file is in the section `images`.
+    Stored {
+        /// What messages call it.
+        name: String,
+        /// Where in the section it begins: where the one before ends.
+        offset: u64,
+        /// Its length.
+        bytes: u64,
+    },
+    /// It could not be had when the scene file was written.
+    Missing {
+        /// What messages call it.
+        name: String,
+        /// What was wrong, in words that follow the name.
+        reason: String,
+    },
 }
 
 /// Where a scene's colours come from: see [`Colors`].
@@ -53,7 +81,7 @@ pub enum ColorMeta {
     PerTriangle,
     /// The sections `vertex-colors` and `corner-colors`.
     PerVertex,
-    /// These, and the section `material-of-triangle`.
+    /// These, and the section `material-of-triangle`, or `surface-records` in its place.
     PerMaterial {
         /// The materials.
         materials: Vec<Material>,
@@ -61,7 +89,7 @@ pub enum ColorMeta {
 }
 
 impl Meta {
-    /// What there is to say about a mesh and its tree.
+    /// What there is to say about a mesh and its tree, but for the pictures, which have still to be read.
     pub(super) fn new(mesh: &Mesh, tree: &KdTree, source: &str) -> Self {
         let stats = tree.stats();
         let Aabb { min, max } = tree.bounds();
@@ -80,6 +108,9 @@ impl Meta {
             spread: tree.spread(),
             stats,
             colors: ColorMeta::of(&mesh.colors),
+            uses: mesh.colors.uses(),
+            attributes: !mesh.attributes.is_empty(),
+            images: Vec::new(),
         }
     }
 
@@ -104,7 +135,49 @@ impl Meta {
         if Scale::of_exponent(meta.scale_exponent).is_none() {
             return Err(format!("its coordinates cannot be scaled by 2^{}", meta.scale_exponent));
         }
+        meta.check_materials()?;
+        meta.check_images()?;
         Ok(meta)
+    }
+
+    /// Whether all triangles have a material, where there are any, and all pictures that are named are there.
+    fn check_materials(&self) -> Result<(), String> {
+        let materials = self.colors.materials();
+        let of_all = self.uses.iter().try_fold(0u64, |sum, &uses| sum.checked_add(uses));
+        let expected = if materials.is_empty() { 0 } else { self.triangles };
+        if self.uses.len() != materials.len() || of_all != Some(expected) {
+            return Err("its uses of materials are not those of its triangles".into());
+        }
+        let there = |image: u32| (image as usize) < self.images.len();
+        match materials.iter().find(|material| !material.maps.all().all(|map| there(map.image))) {
+            Some(material) => Err(format!("material {} names a picture that is not there", material.name)),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether pictures lie one behind the other.
+    fn check_images(&self) -> Result<(), String> {
+        let mut end = 0;
+        for image in &self.images {
+            if let ImageMeta::Stored { name, offset, bytes } = image {
+                if *offset != end || *bytes > MAX_IMAGE_BYTES {
+                    return Err(format!("picture {name} has no place of its own"));
+                }
+                end += bytes;
+            }
+        }
+        Ok(())
+    }
+
+    /// How many triangles give off light.
+    pub(super) fn emitters(&self) -> u64 {
+        let materials = self.colors.materials().iter().zip(&self.uses);
+        materials.filter(|(material, _)| material.emits()).map(|(_, uses)| uses).sum()
+    }
+
+    /// Bytes of the section `images`.
+    pub(super) fn image_bytes(&self) -> u64 {
+        self.images.iter().map(ImageMeta::bytes).sum()
     }
 
     /// The box around all triangles, in the tree's coordinates.
@@ -119,7 +192,32 @@ impl Meta {
     }
 }
 
+impl ImageMeta {
+    /// What messages call it.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Stored { name, .. } | Self::Missing { name, .. } => name,
+        }
+    }
+
+    /// The length of its file; 0 if it is missing.
+    pub fn bytes(&self) -> u64 {
+        match *self {
+            Self::Stored { bytes, .. } => bytes,
+            Self::Missing { .. } => 0,
+        }
+    }
+}
+
 impl ColorMeta {
+    /// The materials; none if colours are of another kind.
+    pub fn materials(&self) -> &[Material] {
+        match self {
+            Self::PerMaterial { materials } => materials,
+            _ => &[],
+        }
+    }
+
     fn of(colors: &Colors) -> Self {
         match colors {
             Colors::Uniform(color) => Self::Uniform { color: color.to_array() },

@@ -2,7 +2,7 @@
 //!
 //! [`write()`] makes one; [`File::open`] maps one. All arrays lie in it as they do in memory, so that opening a
 //! scene costs no parsing and no building: [`File::tree`] gives the tree that was written, [`File::stored`] its
-//! surfaces, [`File::mesh`] the mesh. Every block of 4 KiB has a checksum; what is handed out has been checked,
+//! surfaces, [`File::mesh`] the mesh. Pictures that materials name are in it too, so that it stands alone. Every block of 4 KiB has a checksum; what is handed out has been checked,
 //! and [`File::verify`] checks everything. `format.md` beside this file has every byte.
 //!
 //! | file | what it says |
@@ -16,6 +16,9 @@
 //! | `large/` | a scene that memory does not hold to a file |
 //! | `reader` | a file, mapped |
 //! | `load` | a file's arrays as tree and mesh |
+//! | `record` | what triangles' corners have beside their places |
+//! | `pictures` | pictures' files inside of a scene file |
+//! | `substance` | what triangles are made of |
 //! | `stored` | a file's surfaces, for shading |
 
 mod checksum;
@@ -24,17 +27,22 @@ pub mod large;
 mod load;
 mod meta;
 mod out;
+mod pictures;
 mod reader;
+mod record;
 mod section;
 mod stored;
+mod substance;
 mod writer;
 
 pub use checksum::{BLOCK, of_block as block_checksum};
 pub use header::VERSION;
-pub use meta::{ColorMeta, Meta};
+pub use meta::{ColorMeta, ImageMeta, Meta};
 pub use reader::File;
+pub use record::SurfaceRecord;
 pub use section::{Kind, Section};
 pub use stored::{Paint, Stored};
+pub use substance::Substances;
 pub use writer::{Written, write};
 
 use std::path::Path;

@@ -142,7 +142,7 @@ impl<'a, W: Write + Seek> Out<'a, W> {
         self.file.flush()?;
         let bytes = table + size_of_val(&self.checksums[..]) as u64;
         (self.progress)(bytes);
-        Ok(Written { bytes, sections: self.sections })
+        Ok(Written { bytes, sections: self.sections, missing_images: Vec::new() })
     }
 }
 

@@ -19,6 +19,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,
+    /// What is mapped, for who reads it piece by piece.
+    handle: Arc<std::fs::File>,
     map: Arc<Mmap>,
     sections: Vec<Section>,
     checksums: Column<u32>,
@@ -38,11 +40,11 @@ impl File {
     /// The file cannot be read, or it says what it is instead.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let map = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
-        Self::of_map(path, Arc::new(map)).map_err(|message| Error::malformed(path, message))
+        let (handle, map) = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
+        Self::of_map(path, handle, Arc::new(map)).map_err(|message| Error::malformed(path, message))
     }
 
-    fn of_map(path: &Path, map: Arc<Mmap>) -> Result<Self, String> {
+    fn of_map(path: &Path, handle: std::fs::File, map: Arc<Mmap>) -> Result<Self, String> {
         let (header, table) = Header::read(&map)?;
         let (end, length) = (header.checksums_offset, header.length as usize);
         let checksums = Column::<u32>::mapped(Arc::clone(&map), end as usize..length)
@@ -53,7 +55,8 @@ impl File {
         let sections =
             sections(&table, end).map_err(|what| format!("its section table makes no sense: {what}"))?;
         let meta = meta(&map, &checksums, &sections)?;
-        let file = Self { path: path.into(), map, sections, checksums, meta, whole: AtomicU32::new(0) };
+        let (path, handle) = (path.into(), Arc::new(handle));
+        let file = Self { path, handle, map, sections, checksums, meta, whole: AtomicU32::new(0) };
         file.check_counts().map_err(|what| format!("its sections do not belong together: {what}"))?;
         Ok(file)
     }
@@ -61,6 +64,11 @@ impl File {
     /// Where it was opened.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The open file.
+    pub(super) fn handle(&self) -> Arc<std::fs::File> {
+        Arc::clone(&self.handle)
     }
 
     /// Its length in bytes.
@@ -78,7 +86,7 @@ impl File {
         &self.sections
     }
 
-    /// The section of a kind, if it has one. Which ones it has follows from the colours.
+    /// The section of a kind, if it has one. Which ones it has follows from its [`Meta`].
     pub fn section(&self, kind: Kind) -> Option<&Section> {
         self.sections.iter().find(|section| section.kind == kind)
     }
@@ -135,8 +143,10 @@ impl File {
     /// Whether the sections are those that the meta section calls for, with as many elements.
     fn check_counts(&self) -> Result<(), String> {
         let Meta { triangles, vertices, .. } = self.meta;
-        let is = |colors: bool, count| if colors { count } else { 0 };
+        let is = |called_for: bool, count| if called_for { count } else { 0 };
         let per_vertex = matches!(self.meta.colors, ColorMeta::PerVertex);
+        let per_material = matches!(self.meta.colors, ColorMeta::PerMaterial { .. });
+        let attributes = self.meta.attributes;
         let expected = [
             (Kind::Triangles, triangles),
             (Kind::Positions, vertices),
@@ -144,10 +154,10 @@ impl File {
             (Kind::TriangleColors, is(matches!(self.meta.colors, ColorMeta::PerTriangle), triangles)),
             (Kind::VertexColors, is(per_vertex, vertices)),
             (Kind::CornerColors, is(per_vertex, triangles)),
-            (
-                Kind::MaterialOfTriangle,
-                is(matches!(self.meta.colors, ColorMeta::PerMaterial { .. }), triangles),
-            ),
+            (Kind::MaterialOfTriangle, is(per_material && !attributes, triangles)),
+            (Kind::SurfaceRecords, is(attributes, triangles)),
+            (Kind::Emitters, self.meta.emitters()),
+            (Kind::Images, self.meta.image_bytes()),
         ];
         for (kind, expected) in expected {
             let count = self.section(kind).map_or(0, |section| section.count);
@@ -180,8 +190,8 @@ fn damaged(sections: &[Section], block: usize) -> String {
     format!("{place}: the checksum of bytes {first} to {last} is another; build it again")
 }
 
-/// The file's bytes, mapped.
-fn map(path: &Path) -> io::Result<Mmap> {
+/// The file, open, and its bytes, mapped.
+fn map(path: &Path) -> io::Result<(std::fs::File, Mmap)> {
     let file = std::fs::File::open(path)?;
     if file.metadata()?.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -190,5 +200,6 @@ fn map(path: &Path) -> io::Result<Mmap> {
     // promise; raypack itself never does, it replaces files whole. Every type that is read from it has a value
     // for any bits, and indices are checked where they are used, so that bytes changed behind our back give
     // wrong pictures or a panic; a file that is cut short ends the process (SIGBUS).
-    unsafe { Mmap::map(&file) }
+    let map = unsafe { Mmap::map(&file) }?;
+    Ok((file, map))
 }

@@ -39,7 +39,7 @@ macro_rules! kinds {
         }
 
         impl Kind {
-            /// All of them, in the order in which they are written.
+            /// All of them, in the order of their numbers.
             pub const ALL: &[Self] = &[$(Self::$kind,)*];
 
             /// Its name, as reports and `format.md` give it.
@@ -84,6 +84,12 @@ kinds! {
     CornerColors = 13, "corner-colors", 9;
     /// The index of each triangle's material, `u32`.
     MaterialOfTriangle = 14, "material-of-triangle", 4;
+    /// The same with texture coordinates and normals, in scenes that have such.
+    SurfaceRecords = 15, "surface-records", 40;
+    /// The triangles whose material gives off light, `u32` each, ascending.
+    Emitters = 16, "emitters", 4;
+    /// The bytes of pictures' files, one behind the other.
+    Images = 17, "images", 1;
 }
 
 impl fmt::Display for Kind {

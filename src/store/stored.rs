@@ -2,20 +2,29 @@
 
 use super::meta::ColorMeta;
 use super::reader::File;
+use super::record::SurfaceRecord;
 use super::section::Kind;
+use super::substance::Substances;
 use crate::column::Column;
 use crate::error::Result;
 use crate::geometry::triangle::Triangle;
-use crate::mesh::{blend, decode};
+use crate::mesh::{Attributes, Image, Material, blend, decode};
 use glam::Vec3;
 
-/// The surfaces of a stored scene: where a triangle's corners are, and what colour it has. Nothing is copied.
+/// The surfaces of a stored scene: where a triangle's corners are, what colour and material it has, and what its
+/// corners have beside. No array is copied.
 ///
 /// It says the same as the [`Mesh`](crate::mesh::Mesh) that was written, to the bit.
 #[derive(Debug)]
 pub struct Stored {
     corners: StoredCorners,
     paint: Paint,
+    /// Empty if there are no attributes.
+    records: Column<SurfaceRecord>,
+    materials: Vec<Material>,
+    images: Vec<Image>,
+    uses: Vec<u64>,
+    emitters: Column<u32>,
 }
 
 /// Where corners are read from.
@@ -41,15 +50,16 @@ pub enum Paint {
         /// The materials' linear RGB.
         diffuse: Vec<Vec3>,
         /// One index a triangle, in range.
-        of_triangle: Column<u32>,
+        of_triangle: Substances,
     },
 }
 
 impl File {
-    /// The surfaces. Checks the checksums of their sections, unless that was done.
+    /// The surfaces. Checks the checksums of their sections, unless that was done; of pictures, who reads them does.
     ///
     /// # Errors
-    /// A section is damaged, or a triangle has a material that is not there.
+    /// A section is damaged, a triangle has a material that is not there, a texture coordinate is not finite, or the
+    /// list of what gives off light is another.
     pub fn stored(&self) -> Result<Stored> {
         let corners = if self.meta().scale().is_none() {
             self.verify_sections(&[Kind::Triangles])?;
@@ -61,7 +71,20 @@ impl File {
                 indices: self.column(Kind::Indices),
             }
         };
-        Ok(Stored { corners, paint: self.paint()? })
+        let paint = self.paint()?;
+        let emitters = self.emitters()?;
+        if let Paint::PerMaterial { of_triangle, .. } = &paint {
+            self.check_emitters(&emitters, of_triangle)?;
+        }
+        Ok(Stored {
+            corners,
+            paint,
+            records: self.records()?,
+            materials: self.meta().colors.materials().to_vec(),
+            images: self.images(),
+            uses: self.meta().uses.clone(),
+            emitters,
+        })
     }
 
     /// The colours. Checks the checksums of their sections, unless that was done.
@@ -69,16 +92,27 @@ impl File {
     /// # Errors
     /// A section is damaged, or a triangle has a material that is not there.
     pub fn paint(&self) -> Result<Paint> {
-        self.verify_sections(&[Kind::TriangleColors, Kind::CornerColors, Kind::MaterialOfTriangle])?;
+        self.verify_sections(&[Kind::TriangleColors, Kind::CornerColors])?;
         Ok(match &self.meta().colors {
             ColorMeta::Uniform { color } => Paint::Uniform((*color).into()),
             ColorMeta::PerTriangle => Paint::PerTriangle(self.column(Kind::TriangleColors)),
             ColorMeta::PerVertex => Paint::PerCorner(self.column(Kind::CornerColors)),
             ColorMeta::PerMaterial { materials } => Paint::PerMaterial {
                 diffuse: materials.iter().map(|material| material.diffuse).collect(),
-                of_triangle: self.material_of_triangle(materials.len())?,
+                of_triangle: self.substances()?,
             },
         })
+    }
+
+    /// Bytes of memory that a scene's materials, its pictures' names and the list of what gives off light take up,
+    /// of whose triangles a part is in memory.
+    pub fn surface_bytes(&self) -> usize {
+        let materials = self.meta().colors.materials();
+        let names: usize = materials.iter().map(|material| material.name.len() + material.place.len()).sum();
+        // With the list of their colours.
+        let each = size_of::<Material>() + size_of::<Vec3>() + size_of::<u64>();
+        let emitters = self.section(Kind::Emitters).map_or(0, |section| section.bytes as usize);
+        materials.len() * each + names + emitters + self.images_bytes()
     }
 }
 
@@ -104,9 +138,44 @@ impl Stored {
     #[inline]
     pub fn material(&self, primitive: u32) -> u32 {
         match &self.paint {
-            Paint::PerMaterial { of_triangle, .. } => of_triangle[primitive as usize],
+            Paint::PerMaterial { of_triangle, .. } => of_triangle.at(primitive),
             _ => 0,
         }
+    }
+
+    /// What a triangle's corners have; [`Attributes::NONE`] if no triangle's have anything. Panics if `primitive` is
+    /// out of range and some have.
+    #[inline]
+    pub fn attributes(&self, primitive: u32) -> Attributes {
+        if self.records.is_empty() {
+            return Attributes::NONE;
+        }
+        self.records[primitive as usize].attributes
+    }
+
+    /// Whether any triangle has texture coordinates or normals.
+    pub fn has_attributes(&self) -> bool {
+        !self.records.is_empty()
+    }
+
+    /// The materials; none if the colours are of another kind.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// The pictures that materials name. They are in the file until they are read.
+    pub fn images(&self) -> &[Image] {
+        &self.images
+    }
+
+    /// How many triangles each of the materials has.
+    pub fn uses(&self) -> &[u64] {
+        &self.uses
+    }
+
+    /// The triangles whose material gives off light, ascending.
+    pub fn emitters(&self) -> &[u32] {
+        &self.emitters
     }
 }
 
@@ -119,7 +188,7 @@ impl Paint {
             Self::Uniform(color) => *color,
             Self::PerTriangle(colors) => decode(colors[i]),
             Self::PerCorner(colors) => blend(colors[i], u, v),
-            Self::PerMaterial { diffuse, of_triangle } => diffuse[of_triangle[i] as usize],
+            Self::PerMaterial { diffuse, of_triangle } => diffuse[of_triangle.at(primitive) as usize],
         }
     }
 }

@@ -56,7 +56,7 @@ fn cache(ways: usize, policy: Replacement, broken: Option<usize>) -> (Arc<Blocks
         loading: Loading::Synchronous,
         direct: false,
     };
-    let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0], BLOCK);
+    let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
     let shape = Shape { stripes: 1, sets: 1, ways, policy };
     let plan = Plan { shapes: [Some(shape), None], pinned: PINNED, all: ways + PINNED };
     Blocks::new(layout, Box::new(Numbered { broken }), &options, &plan, 3).expect("it can begin")

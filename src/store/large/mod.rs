@@ -143,6 +143,10 @@ pub fn build(
             spread,
             stats: stats.clone(),
             colors: color_meta(&mesh.colors),
+            uses: surfaces.uses,
+            // No file that is read piece by piece has any.
+            attributes: false,
+            images: Vec::new(),
         };
         let meta = serde_json::to_vec_pretty(&meta).expect("it is plain data");
         out.section(Kind::Meta, &meta).map_err(cannot)?;

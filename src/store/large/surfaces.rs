@@ -5,6 +5,7 @@ use super::super::section::Kind;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Scale;
+use crate::mesh::Material;
 use crate::mesh::spooled::{SpooledColors, SpooledMesh};
 use crate::spool::Spooled;
 use bytemuck::Pod;
@@ -19,6 +20,8 @@ pub struct Surfaces {
     pub bounds: Aabb,
     /// Triangles whose corners lie on one line.
     pub zero_area: u64,
+    /// How many triangles each of the materials has.
+    pub uses: Vec<u64>,
 }
 
 /// Triangles that a task looks at.
@@ -34,6 +37,7 @@ pub fn write<W: Write + Seek>(
     scale: Scale,
     progress: &dyn Fn(f64),
 ) -> io::Result<Surfaces> {
+    let mut uses = Vec::new();
     copy(out, Kind::Positions, &mesh.positions)?;
     copy(out, Kind::Indices, &mesh.triangles)?;
     progress(0.2);
@@ -50,7 +54,11 @@ pub fn write<W: Write + Seek>(
             )?;
             out.end()?;
         }
-        SpooledColors::PerMaterial { of_triangle, .. } => copy(out, Kind::MaterialOfTriangle, of_triangle)?,
+        SpooledColors::PerMaterial { materials, of_triangle } => {
+            copy(out, Kind::MaterialOfTriangle, of_triangle)?;
+            uses = count(of_triangle, materials.len())?;
+            write_emitters(out, materials, of_triangle, &uses)?;
+        }
     }
     progress(0.4);
 
@@ -73,7 +81,37 @@ pub fn write<W: Write + Seek>(
         out.put(bytemuck::cast_slice(&records))
     })?;
     let section = out.end()?;
-    Ok(Surfaces { records: section.offset, bounds, zero_area })
+    Ok(Surfaces { records: section.offset, bounds, zero_area, uses })
+}
+
+/// How many triangles each of so many materials has.
+fn count(of_triangle: &Spooled<u32>, materials: usize) -> io::Result<Vec<u64>> {
+    let mut uses = vec![0; materials];
+    of_triangle.each(|_, some| {
+        some.iter().for_each(|&material| uses[material as usize] += 1);
+        Ok::<(), io::Error>(())
+    })?;
+    Ok(uses)
+}
+
+/// Writes the section `emitters`, if any triangle gives off light.
+fn write_emitters<W: Write + Seek>(
+    out: &mut Out<'_, W>,
+    materials: &[Material],
+    of_triangle: &Spooled<u32>,
+    uses: &[u64],
+) -> io::Result<()> {
+    let emits: Vec<bool> = materials.iter().map(Material::emits).collect();
+    if !emits.iter().zip(uses).any(|(&emits, &uses)| emits && uses > 0) {
+        return Ok(());
+    }
+    out.begin(Kind::Emitters)?;
+    of_triangle.each(|first, some| {
+        let some = (first as u32..).zip(some).filter(|&(_, &material)| emits[material as usize]);
+        let some: Vec<u32> = some.map(|(primitive, _)| primitive).collect();
+        out.put(bytemuck::cast_slice(&some))
+    })?;
+    out.end().map(drop)
 }
 
 /// Makes a list a section.

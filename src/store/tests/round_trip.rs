@@ -2,18 +2,21 @@
 
 use super::super::{BLOCK, Kind, VERSION};
 use super::*;
+use crate::cache::{CacheOptions, Cached};
 use crate::kdtree::Tree;
-use std::sync::Mutex;
+use crate::scene::{CachedSurface, Look, Surface};
+use std::sync::{Arc, Mutex};
 
 #[test]
 fn tree_and_mesh_come_back_to_the_bit() {
-    for mesh in meshes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for mesh in meshes().into_iter().chain(rich_meshes(folder.path())) {
         let tree = build(&mesh);
         let place = Place::new();
         let written = place.write(&mesh, &tree).expect("written");
         let file = place.open().expect("opens");
         file.verify(&|_| ()).expect("is whole");
-        assert_eq!(file.mesh().expect("a mesh"), mesh);
+        assert_eq!(file.mesh().expect("a mesh"), as_read(&mesh));
         let again = file.tree().expect("a tree");
         let (ours, theirs) = (tree.arrays(), again.arrays());
         assert_eq!(
@@ -28,6 +31,7 @@ fn tree_and_mesh_come_back_to_the_bit() {
         again.validate().expect("is whole");
         assert_eq!(written.bytes, file.bytes());
         assert_eq!(written.sections, file.sections());
+        assert!(written.missing_images.is_empty(), "{:?}", written.missing_images);
     }
 }
 
@@ -42,17 +46,85 @@ fn a_tree_outlives_its_file() {
 
 #[test]
 fn surfaces_come_back_to_the_bit() {
-    for mesh in meshes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for mesh in meshes().into_iter().chain(rich_meshes(folder.path())) {
         let place = Place::with(&mesh);
-        let stored = place.open().expect("opens").stored().expect("surfaces");
-        for primitive in 0..mesh.triangles.len() as u32 {
-            assert_eq!(stored.corners(primitive), mesh.corners(primitive));
-            for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.45)] {
-                assert_eq!(stored.color(primitive, u, v), mesh.color(primitive, u, v));
-            }
-            assert_eq!(stored.material(primitive), mesh.material(primitive));
+        let file = place.open().expect("opens");
+        same_surfaces(&mesh, &file.stored().expect("surfaces"));
+        // As little memory as does: what a triangle has comes and goes.
+        let open = |memory| Cached::open(&file, &CacheOptions::default(), memory, 0, 2);
+        let least = open(1).expect_err("nothing fits a byte").to_string();
+        let least =
+            least.split("at least ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a number");
+        let cached = Arc::new(open(least.parse::<usize>().expect("a number") << 20).expect("the least"));
+        let surface = CachedSurface::new(Arc::clone(&cached), &file).expect("surfaces");
+        // It is read, and the old file, when another has taken the name.
+        place.write(&meshes()[0], &build(&mesh)).expect("written");
+        cached.or_error(|| same_surfaces(&mesh, &surface)).expect("can be read");
+    }
+}
+
+/// Whether both say the same of everything.
+fn same_surfaces(mesh: &Mesh, surface: &impl Surface) {
+    assert_eq!(Surface::materials(mesh), surface.materials());
+    assert_eq!((Surface::uses(mesh), Surface::emitters(mesh)), (surface.uses(), surface.emitters()));
+    assert_eq!(Surface::has_attributes(mesh), surface.has_attributes());
+    assert_eq!(mesh.images.len(), surface.images().len());
+    for (ours, theirs) in mesh.images.iter().zip(surface.images()) {
+        assert_eq!((&ours.name, ours.source.read()), (&theirs.name, theirs.source.read()));
+    }
+    let (ours, theirs) = (Surface::reader(mesh), surface.reader());
+    for primitive in 0..mesh.triangles.len() as u32 {
+        assert_eq!(surface.corners(primitive), mesh.corners(primitive));
+        assert_eq!(surface.material(primitive), mesh.material(primitive));
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.45)] {
+            assert_eq!(surface.color(primitive, u, v), mesh.color(primitive, u, v));
+            assert_eq!(theirs.look(primitive, u, v), ours.look(primitive, u, v));
+            assert_eq!(theirs.detail(primitive, u, v), ours.detail(primitive, u, v));
         }
     }
+}
+
+#[test]
+fn a_picture_that_cannot_be_read_is_missing_and_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mesh = rich_meshes(folder.path()).remove(3);
+    let tree = build(&mesh);
+    let place = Place::new();
+    std::fs::remove_file(folder.path().join("wood.png")).expect("it was there");
+    let written = place.write(&mesh, &tree).expect("written all the same");
+    let [said] = &written.missing_images[..] else { panic!("{:?}", written.missing_images) };
+    assert!(said.starts_with("wood.png cannot be read: ") && !said.contains('\n'), "{said}");
+    let file = place.open().expect("opens");
+    assert!(
+        matches!(&file.images()[0].source, ImageSource::Missing(why) if why.starts_with("cannot be read"))
+    );
+    assert_eq!(file.mesh().expect("a mesh"), as_read(&mesh));
+    // It was missing before when the scene is written once more.
+    let mesh = file.mesh().expect("a mesh");
+    assert!(place.write(&mesh, &tree).expect("written").missing_images.is_empty());
+}
+
+#[test]
+fn a_scene_has_the_sections_that_it_calls_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let has = |mesh: &Mesh, kind| Place::with(mesh).open().expect("opens").section(kind).map(|s| s.count);
+    for (plain, rich) in meshes().iter().zip(rich_meshes(folder.path())) {
+        let materials = !plain.colors.materials().is_empty();
+        assert_eq!(has(plain, Kind::MaterialOfTriangle), materials.then_some(300));
+        assert_eq!(has(&rich, Kind::MaterialOfTriangle), None);
+        assert_eq!((has(plain, Kind::SurfaceRecords), has(&rich, Kind::SurfaceRecords)), (None, Some(300)));
+        let lamps = (0..300).filter(|i| i % 11 % 4 == 2).count() as u64;
+        assert_eq!(
+            (has(plain, Kind::Emitters), has(&rich, Kind::Emitters)),
+            (None, materials.then_some(lamps))
+        );
+        assert_eq!((has(plain, Kind::Images), has(&rich, Kind::Images)), (None, Some(15_003)));
+    }
+    // Lights without attributes.
+    let bare = Mesh { attributes: Vec::new(), ..rich_meshes(folder.path()).remove(3) };
+    assert_eq!(has(&bare, Kind::SurfaceRecords), None);
+    assert!(has(&bare, Kind::Emitters).is_some() && has(&bare, Kind::MaterialOfTriangle).is_some());
 }
 
 #[test]
@@ -139,8 +211,18 @@ fn the_document_names_every_section_and_member() {
     assert!(document.contains(&format!("version {VERSION}")));
     let place = Place::with(&meshes()[0]);
     let meta = serde_json::to_value(place.open().expect("opens").meta()).expect("plain data");
-    for member in meta.as_object().expect("an object").keys() {
-        assert!(document.contains(&format!("`{member}`")), "format.md lacks the member {member}");
+    let material = serde_json::to_value(lamp()).expect("plain data");
+    let map = Map::whole(0, Channel::Color);
+    for (members, quote) in [
+        (meta, '`'),
+        (material["maps"].clone(), '`'),
+        (material, '`'),
+        (serde_json::to_value(map).expect("plain data"), '"'),
+    ] {
+        for member in members.as_object().expect("an object").keys() {
+            let name = format!("{quote}{member}{quote}");
+            assert!(document.contains(&name), "format.md lacks the member {member}");
+        }
     }
 }
 
@@ -185,4 +267,9 @@ fn a_mesh_with_anothers_tree_or_colors_is_refused() {
     refused(&with(Colors::PerTriangle(vec![[0; 3]; 299])), &tree);
     refused(&with(Colors::Uniform(Vec3::NAN)), &tree);
     refused(&with(Colors::PerMaterial { materials: vec![], of_triangle: vec![0; 300] }), &tree);
+    refused(&Mesh { attributes: vec![Attributes::NONE; 299], ..mesh.clone() }, &tree);
+    let mut infinite = vec![Attributes::NONE; 300];
+    infinite[77].uv[2][1] = f32::INFINITY;
+    refused(&Mesh { attributes: infinite, ..mesh.clone() }, &tree);
+    refused(&with(Colors::PerMaterial { materials: vec![glass()], of_triangle: vec![0; 300] }), &tree);
 }

@@ -113,7 +113,7 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
         let cached = Arc::new(cached);
         let accel =
             Accel::of_cached(Arc::clone(&cached)).with_isa(options.isa).with_accuracy(options.accuracy);
-        let surface = CachedSurface::new(Arc::clone(&cached), file);
+        let surface = CachedSurface::new(Arc::clone(&cached), file)?;
         let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
         cached.trace_uses(true);
         for warm in [false, true] {
