@@ -3,6 +3,7 @@
 use super::surface::{Detail, Look, Surface};
 use crate::cache::{Array, Cached, View};
 use crate::error::Result;
+use crate::kdtree::Tree;
 use crate::mesh::{Attributes, Image, Material, blend, decode};
 use crate::store::{self, ColorMeta, SurfaceRecord};
 use glam::Vec3;
@@ -137,6 +138,11 @@ impl Look for CachedReader<'_> {
     fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
         let Self { surface, view } = self;
         (surface.corners_in(view, primitive), surface.color_in(view, primitive, u, v))
+    }
+
+    #[inline]
+    fn material(&self, primitive: u32) -> u32 {
+        self.surface.material_in(&self.view, primitive)
     }
 
     #[inline]

@@ -5,6 +5,7 @@
 //! [`Surface`] is what it falls on, [`texture`] the pictures there.
 
 mod cached;
+mod alias;
 mod camera;
 pub mod effects;
 mod emitters;

@@ -1,12 +1,8 @@
 //! What shading asks of the triangles that rays hit.
 
-use crate::cache::{Array, Cached, View};
-use crate::error::Result;
-use crate::kdtree::Tree;
-use crate::mesh::{Attributes, Image, Material, Mesh, blend, decode};
-use crate::store::{self, ColorMeta, Stored, SurfaceRecord};
+use crate::mesh::{Attributes, Image, Material, Mesh};
+use crate::store::Stored;
 use glam::Vec3;
-use std::sync::Arc;
 
 /// Surfaces by primitive id: a [`Mesh`], or those of a scene file.
 ///
@@ -67,12 +63,17 @@ impl Look for &Mesh {
         (self.corners(primitive), self.color(primitive, u, v))
     }
 
+    #[inline(always)]
+    fn material(&self, primitive: u32) -> u32 {
+        Mesh::material(self, primitive)
+    }
+
     #[inline]
     fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
         Detail {
             corners: self.corners(primitive),
             color: self.color(primitive, u, v),
-            material: self.material(primitive),
+            material: Mesh::material(self, primitive),
             attributes: self.attributes.get(primitive as usize).copied().unwrap_or(Attributes::NONE),
         }
     }
@@ -84,12 +85,17 @@ impl Look for &Stored {
         (self.corners(primitive), self.color(primitive, u, v))
     }
 
+    #[inline(always)]
+    fn material(&self, primitive: u32) -> u32 {
+        Stored::material(self, primitive)
+    }
+
     #[inline]
     fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
         Detail {
             corners: self.corners(primitive),
             color: self.color(primitive, u, v),
-            material: self.material(primitive),
+            material: Stored::material(self, primitive),
             attributes: self.attributes(primitive),
         }
     }

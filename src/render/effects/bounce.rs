@@ -23,6 +23,17 @@ impl Queues {
     }
 }
 
+/// The part of the light that a surface itself throws to the eye, as linear RGB weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scattered {
+    /// What comes from anywhere.
+    pub matt: Vec3,
+    /// What comes from near the mirror's direction, of light that no ray will meet there: from points.
+    pub points: Vec3,
+    /// The same of light that rays may meet, if none was sent.
+    pub lights: Vec3,
+}
+
 /// What surfaces do with light that is not stopped.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounce {
@@ -41,7 +52,7 @@ const DEEP: u16 = 3;
 
 impl Bounce {
     /// Sends off what is seen through a surface, in it, and inside of it. What is left for the surface itself to
-    /// scatter: all around, and near the mirror's direction from lights alone.
+    /// scatter comes back.
     #[inline]
     pub fn specular(
         &self,
@@ -50,7 +61,7 @@ impl Bounce {
         sequence: &Sequence,
         weight: Vec3,
         next: &mut Queues,
-    ) -> [Vec3; 2] {
+    ) -> Scattered {
         let material = point.material;
         if self.set.has(Effect::Refraction) && material.transmission != Vec3::ZERO {
             return self.transparent(path, point, sequence, weight, next);
@@ -58,10 +69,12 @@ impl Bounce {
         let is_smooth = point.roughness < SMOOTH;
         let effect = if is_smooth { Effect::Reflection } else { Effect::Glossy };
         if !material.reflects {
-            return [weight * point.diffuse, weight * point.specular];
+            // The classic model: highlights come on top of the colour, which files give without regard to them.
+            let gloss = weight * point.specular;
+            return Scattered { matt: weight * point.diffuse, points: gloss, lights: gloss };
         }
         if point.specular == Vec3::ZERO || !self.set.has(effect) {
-            return [weight * point.diffuse, Vec3::ZERO];
+            return Scattered { matt: weight * point.diffuse, ..Scattered::default() };
         }
         let curved = material.fresnel && self.set.has(Effect::Fresnel);
         let shown = |cosine: f32| if curved { schlick(point.specular, cosine) } else { point.specular };
@@ -72,12 +85,10 @@ impl Bounce {
             // A microfacet's normal, of those that the eye sees.
             let basis = Basis::of(point.normal);
             let wo = basis.to_local(point.toward);
-            let half = ggx::sample_visible(wo, point.roughness, path.random(sequence, Use::Gloss));
-            let wi = 2.0 * wo.dot(half) * half - wo;
-            let toward = basis.to_world(wi);
-            if wi.z > 0.0 && point.face.dot(toward) > 0.0 {
-                let share = ggx::weight(wo, wi, point.roughness);
-                let weight = weight * shown(wo.dot(half)) * share;
+            let sample = ggx::sample(wo, point.roughness, path.random(sequence, Use::Gloss));
+            let toward = sample.map(|sample| (basis.to_world(sample.wi), sample));
+            if let Some((toward, sample)) = toward.filter(|(toward, _)| point.face.dot(*toward) > 0.0) {
+                let weight = weight * shown(sample.cos_facet) * sample.weight;
                 // The lobe's width blurs what pictures show in it.
                 let spread = path.cone.spread + 0.25 * point.roughness;
                 self.send(
@@ -90,7 +101,11 @@ impl Bounce {
                 );
             }
         }
-        [weight * point.diffuse * (1.0 - reflectance.max_element()).max(0.0), Vec3::ZERO]
+        Scattered {
+            matt: weight * point.diffuse * (1.0 - reflectance.max_element()).max(0.0),
+            points: if is_smooth { Vec3::ZERO } else { weight * reflectance },
+            lights: Vec3::ZERO,
+        }
     }
 
     /// The same for a surface that light goes through.
@@ -101,7 +116,7 @@ impl Bounce {
         sequence: &Sequence,
         weight: Vec3,
         next: &mut Queues,
-    ) -> [Vec3; 2] {
+    ) -> Scattered {
         let material = point.material;
         let is_thin = material.ior == 1.0;
         let eta = match (is_thin, point.is_front) {
@@ -139,7 +154,8 @@ impl Bounce {
             let going = (point.origin_behind(), toward, entering * material.transmission, path.cone.spread);
             self.send(&inside, point, sequence, Way::Refraction, going, next);
         }
-        [entering * point.diffuse * (1.0 - material.transmission.max_element()), Vec3::ZERO]
+        let matt = entering * point.diffuse * (1.0 - material.transmission.max_element());
+        Scattered { matt, ..Scattered::default() }
     }
 
     fn mirror(&self, path: &Path, point: &Point<'_>, sequence: &Sequence, weight: Vec3, next: &mut Queues) {

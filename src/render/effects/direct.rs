@@ -1,11 +1,12 @@
 //! Light that comes to a matt surface straight from where it is made.
 
+use super::bounce::Scattered;
 use super::path::{Path, Use};
 use super::point::Point;
 use crate::geometry::Ray;
 use crate::render::scatter::{Basis, Sequence, cosine_hemisphere, ggx};
-use crate::scene::effects::{Effect, EffectSet, SMOOTH};
-use crate::scene::{Light, Lights, ShadowRay};
+use crate::scene::effects::{Effect, EffectSet};
+use crate::scene::{Lights, ShadowRay};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -39,10 +40,11 @@ impl Direct<'_> {
         path: &Path,
         point: &Point<'_>,
         sequence: &Sequence,
-        [matt, gloss]: [Vec3; 2],
+        scattered: &Scattered,
         sum: &mut Vec3,
         rays: &mut Vec<LightRay>,
     ) {
+        let Scattered { matt, lights: gloss, .. } = *scattered;
         let mut add = |effect: Effect, ray: Ray, light: Vec3| {
             if light.max_element() <= 0.0 {
             } else if self.set.has(effect) {
@@ -54,20 +56,19 @@ impl Direct<'_> {
         let origin = point.origin(true);
         if let Some(light) = &self.lights.key {
             let way = light.from(origin);
-            let light = self.key(point, light, &way, [matt, gloss]);
+            let light = self.key(point, &way, scattered);
             add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
         }
         if let Some(emitters) = &self.lights.emitters {
-            let [pick, _] = path.random(sequence, Use::Light);
-            let light = emitters.sample(pick, path.random(sequence, Use::LightPlace));
+            let light = emitters.sample(path.random(sequence, Use::Light), path.random(sequence, Use::LightPlace));
             let way = light.position - origin;
             let distance = way.length();
             let toward = way / distance;
             let cosines = point.normal.dot(toward).max(0.0) * light.normal.dot(toward).abs();
             // A point on the light itself, or on its back's edge, gets nothing from here.
             if cosines > 0.0 && point.face.dot(toward) > 0.0 && distance > 0.0 && light.pdf_area > 0.0 {
-                let scattered = matt * FRAC_1_PI + gloss * self.lobe(point, toward);
-                let light = scattered * light.radiance * (cosines / (distance * distance * light.pdf_area));
+                let thrown = matt * FRAC_1_PI + gloss * self.lobe(point, toward);
+                let light = thrown * light.radiance * (cosines / (distance * distance * light.pdf_area));
                 // Short of the light, which would hide itself.
                 let ray = Ray::segment(origin, way, 0.0, 1.0 - 1e-4);
                 add(Effect::SoftShadows, ray, light);
@@ -77,8 +78,8 @@ impl Direct<'_> {
             let sample = environment.sample(path.random(sequence, Use::Environment));
             let cosine = point.normal.dot(sample.direction);
             if cosine > 0.0 && point.face.dot(sample.direction) > 0.0 && sample.pdf > 0.0 {
-                let scattered = matt * FRAC_1_PI + gloss * self.lobe(point, sample.direction);
-                let light = scattered * sample.radiance * (cosine / sample.pdf);
+                let thrown = matt * FRAC_1_PI + gloss * self.lobe(point, sample.direction);
+                let light = thrown * sample.radiance * (cosine / sample.pdf);
                 add(Effect::Environment, Ray::new(origin, sample.direction), light);
             }
         }
@@ -101,26 +102,24 @@ impl Direct<'_> {
     /// Light of the key light. Its irradiance is what a white surface that faces it throws back: that divided by
     /// pi.
     #[inline]
-    fn key(&self, point: &Point<'_>, _: &Light, way: &ShadowRay, [matt, gloss]: [Vec3; 2]) -> Vec3 {
+    fn key(&self, point: &Point<'_>, way: &ShadowRay, scattered: &Scattered) -> Vec3 {
         let cosine = point.normal.dot(way.toward);
         if cosine <= 0.0 || point.face.dot(way.toward) <= 0.0 {
             return Vec3::ZERO;
         }
-        (matt + gloss * (PI * self.lobe(point, way.toward))) * way.irradiance * cosine
+        (scattered.matt + scattered.points * (PI * self.lobe(point, way.toward))) * way.irradiance * cosine
     }
 
     /// How much of the light from `toward` a surface throws to the eye near the mirror's direction, for each unit of
     /// its specular reflectance.
     #[inline]
     fn lobe(&self, point: &Point<'_>, toward: Vec3) -> f32 {
-        if !self.set.has(Effect::Highlights) || point.specular == Vec3::ZERO {
+        const LOBES: EffectSet = EffectSet::of(&[Effect::Highlights, Effect::Glossy]);
+        if !self.set.has_any(LOBES) || point.specular == Vec3::ZERO {
             return 0.0;
         }
         let basis = Basis::of(point.normal);
-        ggx::evaluate(
-            basis.to_local(point.toward),
-            basis.to_local(toward),
-            point.roughness.max(SHARPEST.max(SMOOTH)),
-        )
+        let [wo, wi] = [point.toward, toward].map(|v| basis.to_local(v));
+        ggx::evaluate(wo, wi, point.roughness.max(SHARPEST), |_| Vec3::ONE).x
     }
 }

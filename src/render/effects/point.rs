@@ -120,7 +120,7 @@ impl<'a> Resolver<'a> {
                 self.bump(point, attributes, uv, print);
             }
         }
-        point.normal = consistent_normal(point.normal, point.face, point.toward);
+        point.normal = consistent_normal(point.toward, point.face, point.normal);
     }
 
     fn color(&self, point: &mut Point<'a>, uv: Vec2, print: f32) {
@@ -157,7 +157,7 @@ impl<'a> Resolver<'a> {
         if let Some(map) = &maps.bump {
             // The surface rises by the slope along each tangent; heights are in units of the coordinates, so that a
             // slope of 1 is 45 degrees whatever the scale of the scene.
-            let slope = self.textures.slope(map, uv, print);
+            let slope = self.textures.gradient(map, uv, print);
             let tilted = up - along_u.normalize_or_zero() * slope.x - along_v.normalize_or_zero() * slope.y;
             point.normal = tilted.normalize_or(up) * side;
         }
@@ -184,9 +184,8 @@ impl Point<'_> {
         if !to_light || self.normals.contains(&Normal::NONE) {
             return off;
         }
-        let side = if self.is_front { 1.0 } else { -1.0 };
-        let normals = self.normals.map(|normal| normal.decode() * side);
-        off + terminator_offset(&self.corners, &normals, self.u, self.v)
+        let normals = self.normals.map(Normal::decode);
+        off + terminator_offset(self.corners, normals, self.u, self.v, self.face)
     }
 
     /// Where a ray starts that goes through the surface.

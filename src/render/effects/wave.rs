@@ -5,7 +5,7 @@
 //! pixel's light is added up in the order of its own paths, whoever its neighbours are: pictures are the same for
 //! every size of a tile.
 
-use super::bounce::{Bounce, Queues};
+use super::bounce::{Bounce, Queues, Scattered};
 use super::cost::Tallies;
 use super::direct::{Direct, LightRay};
 use super::holes::Holes;
@@ -18,7 +18,7 @@ use crate::render::scatter::Sequence;
 use crate::render::stats::Tally;
 use crate::scene::effects::{Effect, EffectSet};
 use crate::scene::{Look, Surface};
-use crate::traverse::{Accel, Kernel};
+use crate::traverse::{Accel, Dispatch, Kernel};
 use glam::Vec3;
 use std::time::Instant;
 
@@ -49,6 +49,13 @@ pub struct Waves {
     light_rays: Vec<Ray>,
     occluded: Vec<bool>,
     asked: Vec<usize>,
+}
+
+impl Waves {
+    /// Empty, with what has been learnt before about kernels.
+    pub fn new(learnt: Dispatch) -> Self {
+        Self { tracer: Tracer::new(learnt), ..Self::default() }
+    }
 }
 
 /// Effects that need surfaces' pictures, coordinates or normals.
@@ -209,13 +216,13 @@ impl<S: Surface> World<'_, S> {
             let scattered = if RAYS {
                 self.bounce.specular(path, &point, &sequence, weight, next)
             } else {
-                [weight * point.diffuse, Vec3::ZERO]
+                Scattered { matt: weight * point.diffuse, ..Scattered::default() }
             };
-            if scattered != [Vec3::ZERO; 2] {
-                self.direct.gather(path, &point, &sequence, scattered, sum, lights);
+            if scattered != Scattered::default() {
+                self.direct.gather(path, &point, &sequence, &scattered, sum, lights);
             }
             if RAYS && self.set.has(Effect::Interreflection) {
-                self.bounce.diffuse(path, &point, &sequence, scattered[0], next);
+                self.bounce.diffuse(path, &point, &sequence, scattered.matt, next);
             }
         }
     }

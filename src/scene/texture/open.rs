@@ -16,17 +16,22 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// A model's picture, with the levels that its uses call for.
 pub(super) fn open(image: &Image, uses: Uses) -> Result<Picture, Problem> {
-    let decoded = match &image.source {
-        ImageSource::File(path) => match open_file(path) {
-            Ok(file) => decode(file, path),
-            Err(error) => Err(format!("cannot be read: {error}")),
-        },
-        ImageSource::Bytes(bytes) => decode(Cursor::new(&bytes[..]), Path::new(&image.name)),
-        ImageSource::Missing(why) => Err(why.clone()),
-    };
+    // The bytes first: a scene file's are checked as a whole, and a decoder that stops early must not hide damage.
+    let decoded = image
+        .source
+        .read()
+        .and_then(|bytes| decode(Cursor::new(&bytes[..]), name_of(image)));
     match decoded {
         Ok(picture) => Ok(Picture::new(picture, uses)),
         Err(message) => Err(Problem { image: image.name.clone(), message: one_line(&message) }),
+    }
+}
+
+/// What tells of the kind of picture where its bytes do not.
+fn name_of(image: &Image) -> &Path {
+    match &image.source {
+        ImageSource::File(path) => path,
+        _ => Path::new(&image.name),
     }
 }
 
