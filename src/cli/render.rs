@@ -43,7 +43,8 @@ pub struct Args {
     #[command(flatten)]
     outputs: Outputs,
     /// The camera, or a TOML file with these keys; without it, the whole scene is framed. FOV is
-    /// vertical, in degrees (45 if left out); UP is 0,1,0 if left out
+    /// vertical, in degrees (45 if left out); UP is 0,1,0 if left out. With ;aperture=D, a lens of that diameter, what
+    /// is nearer or farther than AT, or than ;focus=D, is out of focus
     #[arg(long, value_name = "eye=X,Y,Z;at=X,Y,Z;up=X,Y,Z;fov=DEG", allow_hyphen_values = true)]
     camera: Option<String>,
     /// Width and height in pixels [default: 1024x1024, and 1280x720 for the built-in scene]

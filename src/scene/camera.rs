@@ -1,4 +1,4 @@
-//! A pinhole camera: where the eye is and what it sees.
+//! The camera: where the eye is, what it sees, and what of that is sharp.
 
 use super::View;
 use crate::error::{Error, Result};
@@ -9,11 +9,11 @@ use std::fmt;
 /// The vertical field of view of a camera that names none, in degrees.
 pub const DEFAULT_FOV: f32 = 45.0;
 
-/// A pinhole camera.
+/// A camera: a pinhole, or a thin lens if it has an aperture.
 ///
-/// It is written `eye=x,y,z;at=x,y,z;up=x,y,z;fov=DEG` on the command line ([`Camera::parse`]
-/// reads that form, `Display` writes it so that it comes back bit for bit) or as the same keys in
-/// a TOML file.
+/// It is written `eye=x,y,z;at=x,y,z;up=x,y,z;fov=DEG` on the command line, followed by
+/// `;aperture=D;focus=D` if it has a lens ([`Camera::parse`] reads that form, `Display` writes it so
+/// that it comes back bit for bit) or as the same keys in a TOML file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
@@ -28,7 +28,22 @@ pub struct Camera {
     /// Vertical field of view in degrees, between 0 and 180.
     #[serde(default = "default_fov")]
     pub fov: f32,
+    /// Diameter of the lens, in the scene's units. 0 is a pinhole, which sees everything sharp.
+    #[serde(default, skip_serializing_if = "is_pinhole")]
+    pub aperture: f32,
+    /// How far ahead of the eye the plane is that a lens sees sharp; `None`: it goes through `at`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus: Option<f32>,
 }
+
+/// Whether an aperture is none.
+fn is_pinhole(aperture: &f32) -> bool {
+    *aperture == 0.0
+}
+
+/// Of the widest lens, half a million times as wide as the plane that is sharp is far: beyond it directions have no
+/// digits left for the picture.
+const MAX_LENS_SLOPE: f64 = 2.5e5;
 
 fn default_up() -> Vec3 {
     Vec3::Y
@@ -39,9 +54,9 @@ fn default_fov() -> f32 {
 }
 
 impl Camera {
-    /// A camera with +Y up and [`DEFAULT_FOV`].
+    /// A pinhole with +Y up and [`DEFAULT_FOV`].
     pub const fn new(eye: Vec3, at: Vec3) -> Self {
-        Self { eye, at, up: Vec3::Y, fov: DEFAULT_FOV }
+        Self { eye, at, up: Vec3::Y, fov: DEFAULT_FOV, aperture: 0.0, focus: None }
     }
 
     /// Makes rays for a picture of `width` x `height` pixels.
@@ -69,6 +84,12 @@ impl Camera {
         (self.at.as_dvec3() - self.eye.as_dvec3()).length() as f32
     }
 
+    /// The radius of the lens, divided by the distance of the plane that is sharp.
+    pub(super) fn lens_slope(&self) -> f64 {
+        let to_at = || (self.at.as_dvec3() - self.eye.as_dvec3()).length();
+        f64::from(self.aperture) * 0.5 / self.focus.map_or_else(to_at, f64::from)
+    }
+
     /// Whether rays can be made of it.
     ///
     /// # Errors
@@ -88,6 +109,15 @@ impl Camera {
             Some("up is zero; give a direction, such as up=0,1,0".into())
         } else if !(self.fov > 0.0 && self.fov < 180.0) {
             Some(format!("fov={} is not an angle between 0 and 180 degrees", self.fov))
+        } else if !(self.aperture >= 0.0 && self.aperture.is_finite()) {
+            Some(format!("aperture={} is not a diameter; 0 is a pinhole", self.aperture))
+        } else if let Some(focus) = self.focus.filter(|focus| !(*focus > 0.0 && focus.is_finite())) {
+            Some(format!("focus={focus} is not a distance ahead of the eye; it must be above 0"))
+        } else if self.lens_slope() > MAX_LENS_SLOPE {
+            Some(
+                "the aperture is too wide for a plane in focus that near; make it smaller, or focus larger"
+                    .into(),
+            )
         } else {
             None
         }
@@ -109,9 +139,13 @@ fn least_axis(direction: DVec3) -> DVec3 {
 
 impl fmt::Display for Camera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { eye, at, up, fov } = self;
+        let Self { eye, at, up, fov, aperture, focus } = self;
         write!(f, "eye={},{},{};at={},{},{}", eye.x, eye.y, eye.z, at.x, at.y, at.z)?;
-        write!(f, ";up={},{},{};fov={fov}", up.x, up.y, up.z)
+        write!(f, ";up={},{},{};fov={fov}", up.x, up.y, up.z)?;
+        if !is_pinhole(aperture) {
+            write!(f, ";aperture={aperture}")?;
+        }
+        focus.map_or(Ok(()), |focus| write!(f, ";focus={focus}"))
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod table;
 
-use super::texture::{decode, linear, open_file, repair};
+use super::texture::{decode, linear, mix, open_file, repair};
 use crate::error::{Error, Result};
 use glam::{DVec3, Vec3};
 use image::DynamicImage;
@@ -85,11 +85,11 @@ impl Environment {
         let row = |y: isize| y.clamp(0, self.height as isize - 1) as usize;
         let texel = |dx: isize, dy: isize| {
             let (x, y) = (column(left as isize + dx), row(top as isize + dy));
-            Vec3::from_array(self.texels[y * self.width + x])
+            Vec3::from_array(self.texels[y * self.width + x]).extend(0.0)
         };
-        let above = texel(0, 0).lerp(texel(1, 0), x - left);
-        let below = texel(0, 1).lerp(texel(1, 1), x - left);
-        above.lerp(below, y - top)
+        let above = mix(texel(0, 0), texel(1, 0), x - left);
+        let below = mix(texel(0, 1), texel(1, 1), x - left);
+        mix(above, below, y - top).truncate()
     }
 
     /// A direction, more likely where more light comes from; `random` is uniform in the unit square.

@@ -3,6 +3,7 @@
 //! [`Textures`] holds the opened ones; [`Cone`] and [`footprint`] say how much of one a ray sees.
 
 mod cone;
+mod jpeg;
 mod open;
 mod pyramid;
 mod sample;
@@ -133,7 +134,7 @@ impl Textures {
     /// coordinate or footprint is out of range: NaN and infinity are taken for 0 and for the whole picture.
     pub fn sample(&self, map: &Map, uv: Vec2, footprint: f32) -> Vec4 {
         let [u, v] = placed(map, uv);
-        self.sample_at(map, [u, v], footprint * (map.scale[0] * map.scale[1]).abs().sqrt())
+        self.sample_at(map, [u, v], scaled(map, footprint))
     }
 
     /// The RGB of [`sample`](Self::sample).
@@ -155,7 +156,7 @@ impl Textures {
     pub fn gradient(&self, map: &Map, uv: Vec2, footprint: f32) -> Vec2 {
         let Some([width, height]) = self.size(map.image) else { return Vec2::ZERO };
         let [u, v] = placed(map, uv);
-        let footprint = footprint * (map.scale[0] * map.scale[1]).abs().sqrt();
+        let footprint = scaled(map, footprint);
         // Half of the picture at most: over the whole of it, what is repeated would come out level.
         let step =
             |texels: usize| f64::from(footprint).clamp(1.0 / texels as f64, 0.5f64.max(1.0 / texels as f64));
@@ -218,12 +219,25 @@ pub(super) fn linear(word: u16) -> f32 {
     word.light()
 }
 
+/// Between `a` and `b`: of two that are the same that one, to the bit.
+#[inline]
+pub(super) fn mix(a: Vec4, b: Vec4, share: f32) -> Vec4 {
+    a + (b - a) * share
+}
+
 /// Texture coordinates in the picture. In double precision: where a scale makes many tiles of few, the fraction
 /// of one counts.
 #[inline]
 fn placed(map: &Map, uv: Vec2) -> [f64; 2] {
     let place = |x: f32, axis: usize| f64::from(x) * f64::from(map.scale[axis]) + f64::from(map.offset[axis]);
     [place(uv.x, 0), place(uv.y, 1)]
+}
+
+/// A footprint in the picture's units: 0 for what is none.
+#[inline]
+fn scaled(map: &Map, footprint: f32) -> f32 {
+    let scaled = footprint * (map.scale[0] * map.scale[1]).abs().sqrt();
+    if scaled > 0.0 { scaled } else { 0.0 }
 }
 
 #[inline]

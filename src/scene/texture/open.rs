@@ -1,7 +1,7 @@
 //! Picture files, whoever made them, to texels.
 
 use super::pyramid::{Level, Pyramid, Uses};
-use super::{Picture, Problem, repair};
+use super::{Picture, Problem, jpeg, repair};
 use crate::mesh::{Image, ImageSource};
 use image::{DynamicImage, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
 use std::fs::File;
@@ -13,6 +13,8 @@ use std::path::Path;
 const MAX_SIDE: u32 = 32768;
 /// The most memory of a decoded picture: 1 GiB.
 const MAX_BYTES: u64 = 1 << 30;
+
+const ENDS_EARLY: &str = "is a broken picture: it ends too early";
 
 /// A model's picture, with the levels that its uses call for.
 pub(super) fn open(image: &Image, uses: Uses) -> Result<Picture, Problem> {
@@ -57,18 +59,22 @@ pub(in crate::scene) fn decode(input: impl BufRead + Seek, name: &Path) -> Resul
         .unwrap_or_else(|_| Err("is a broken picture: its decoder gave up".into()))
 }
 
-fn guarded(input: impl BufRead + Seek, name: &Path) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(input);
-    if let Ok(format) = ImageFormat::from_path(name) {
-        reader.set_format(format);
-    }
-    let mut reader = reader.with_guessed_format().map_err(|error| format!("cannot be read: {error}"))?;
-    if reader.format().is_none() {
+fn guarded(mut input: impl BufRead + Seek, name: &Path) -> Result<DynamicImage, String> {
+    let unread = |error: io::Error| format!("cannot be read: {error}");
+    let format = ImageReader::new(&mut input).with_guessed_format().map_err(unread)?.format();
+    let Some(format) = format.or_else(|| ImageFormat::from_path(name).ok()) else {
         return Err(
             "is no picture of a known kind; PNG, JPEG, TGA, BMP, GIF, TIFF, WebP, EXR and HDR are read"
                 .into(),
         );
+    };
+    if format == ImageFormat::Jpeg {
+        if !jpeg::is_whole(&mut input).map_err(unread)? {
+            return Err(ENDS_EARLY.into());
+        }
+        input.rewind().map_err(unread)?;
     }
+    let mut reader = ImageReader::with_format(input, format);
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
     limits.max_alloc = Some(MAX_BYTES);
@@ -78,9 +84,7 @@ fn guarded(input: impl BufRead + Seek, name: &Path) -> Result<DynamicImage, Stri
         || format!("is larger than {MAX_SIDE} texels a side or {} MiB; scale it down", MAX_BYTES >> 20);
     let fault = |error: ImageError| match error {
         ImageError::Limits(_) => too_large(),
-        ImageError::IoError(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-            "is a broken picture: it ends too early".into()
-        }
+        ImageError::IoError(error) if error.kind() == io::ErrorKind::UnexpectedEof => ENDS_EARLY.into(),
         error => format!("is a broken picture: {error}"),
     };
     let decoder = reader.into_decoder().map_err(fault)?;

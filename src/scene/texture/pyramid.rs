@@ -39,14 +39,13 @@ pub(super) struct Level<T> {
 impl<T: Texel> Pyramid<T> {
     /// The levels of a picture of at least one texel. An alpha channel that is full everywhere is left out.
     pub(super) fn new(channels: usize, mut base: Level<T>, uses: Uses) -> Self {
-        let mut kept = channels;
-        if channels.is_multiple_of(2)
-            && base.texels.iter().skip(channels - 1).step_by(channels).all(|&a| a == T::FULL)
-        {
-            kept = channels - 1;
-            base.texels =
-                base.texels.chunks_exact(channels).flat_map(|texel| &texel[..kept]).copied().collect();
-        }
+        let is_full = |texel: &[T]| texel[channels - 1] == T::FULL;
+        let kept = if channels.is_multiple_of(2) && base.texels.chunks_exact(channels).all(is_full) {
+            base.drop_alpha(channels);
+            channels - 1
+        } else {
+            channels
+        };
         let wants_color = uses.color && !T::LINEAR;
         let mut pyramid = Self { channels: kept, base, color: Vec::new(), data: Vec::new() };
         if wants_color {
@@ -92,6 +91,15 @@ impl<T: Texel> Pyramid<T> {
 }
 
 impl<T: Texel> Level<T> {
+    /// Moves texels together over their last channel.
+    fn drop_alpha(&mut self, channels: usize) {
+        for i in 0..self.width * self.height {
+            self.texels.copy_within(i * channels..(i + 1) * channels - 1, i * (channels - 1));
+        }
+        self.texels.truncate(self.width * self.height * (channels - 1));
+        self.texels.shrink_to_fit();
+    }
+
     /// The next level. With `weigh` a texel counts for the mean colour as much as there is of it, so that what is
     /// hidden behind no alpha does not come out at the edges of what is there.
     ///

@@ -1,5 +1,6 @@
 //! What a picture has at a place: bilinear within a level, linear between two.
 
+use super::mix;
 use super::pyramid::{Level, Pyramid};
 use super::texel::Texel;
 use glam::Vec4;
@@ -44,7 +45,7 @@ impl<T: Texel> Pyramid<T> {
             return bilinear(of(levels.len()));
         }
         let finer = bilinear(of(level));
-        if toward_next == 0.0 { finer } else { finer.lerp(bilinear(of(level + 1)), toward_next) }
+        if toward_next == 0.0 { finer } else { mix(finer, bilinear(of(level + 1)), toward_next) }
     }
 
     #[inline]
@@ -52,9 +53,9 @@ impl<T: Texel> Pyramid<T> {
         let [(left, right, x), (top, bottom, y)] =
             [between(spot.at[0], level.width, spot.clamp), between(spot.at[1], level.height, spot.clamp)];
         let texel = |x: usize, y: usize| decode(self.texel(level, x, y));
-        let above = texel(left, top).lerp(texel(right, top), x);
-        let below = texel(left, bottom).lerp(texel(right, bottom), x);
-        above.lerp(below, y)
+        let above = mix(texel(left, top), texel(right, top), x);
+        let below = mix(texel(left, bottom), texel(right, bottom), x);
+        mix(above, below, y)
     }
 
     /// RGB and alpha of a texel.
