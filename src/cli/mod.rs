@@ -9,9 +9,11 @@ mod build;
 mod cache;
 mod cache_options;
 mod cast;
+mod effects;
 mod generate;
 mod histogram;
 mod info;
+mod looks;
 mod model;
 mod options;
 mod outputs;
@@ -41,6 +43,7 @@ struct Cli {
 enum Command {
     Render(render::Args),
     Build(build::Args),
+    Effects(effects::Args),
     Info(info::Args),
     Bench(bench::Args),
     Accuracy(accuracy::Args),
@@ -57,6 +60,7 @@ pub fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Build(args) => build::run(args),
+        Command::Effects(args) => effects::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Accuracy(args) => accuracy::run(args),

@@ -4,6 +4,7 @@ mod heat;
 mod report;
 
 use super::cache_options::{CacheArgs, CacheReport};
+use super::looks::LooksOptions;
 use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions, as_option, orbit};
 use super::outputs::Outputs;
@@ -15,6 +16,7 @@ use crate::geometry::Accuracy;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
 use crate::render::{First, RenderSettings, Renderer, Size, Tuning};
+use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::store::{self, is_scene};
@@ -50,9 +52,11 @@ pub struct Args {
     /// Width and height in pixels [default: 1024x1024, and 1280x720 for the built-in scene]
     #[arg(long, value_name = "WxH", allow_hyphen_values = true)]
     size: Option<String>,
-    /// Samples per pixel
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    samples: u32,
+    /// Samples per pixel, at most [default: 1, and 64 if effects of chance run, such as soft shadows]
+    #[arg(long, value_name = "N")]
+    samples: Option<u32>,
+    #[command(flatten)]
+    looks: LooksOptions,
     /// Worker threads; 0 for all processors [default: the profile's]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -108,6 +112,7 @@ pub fn run(args: &Args) -> Result<()> {
     let profile = args.build.profile_for(args.scene.as_deref(), true)?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
+    args.looks.check()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
     let orbit = args.orbit()?;
     let heatmap = args.heatmap.as_deref().map(str::parse::<Cost>).transpose()?;
@@ -181,7 +186,17 @@ impl Args {
         first_within: Option<Duration>,
     ) -> Result<()> {
         let lighting = scene.reading(|| self.lighting(&cameras[0], scene))?;
-        let renderer = Renderer::new(&scene.accel, surface, settings)?;
+        let staged =
+            self.looks.stage(scene, surface, &cameras[0], lighting, (self.samples, !self.no_shadows))?;
+        let settings = RenderSettings {
+            samples: staged.samples,
+            shadows: staged.analysis.set().has(Effect::Shadows),
+            ..settings
+        };
+        let mut renderer = Renderer::new(&scene.accel, surface, settings)?;
+        if let Some(appearance) = &staged.appearance {
+            renderer = renderer.with_appearance(appearance)?;
+        }
         let mut shots = Vec::with_capacity(cameras.len());
         let tiles_done = AtomicUsize::new(0);
         let tiles = renderer.tile_count() * cameras.len();
@@ -208,7 +223,14 @@ impl Args {
         })?;
         let cached = scene.accel.cached().zip(self.build.limit()?);
         let cache = cached.map(|(cached, budget)| CacheReport::new(budget, cached));
-        let report = Report::new(scene, renderer.settings(), self.build.name(), shots, cache);
+        let report = Report::new(
+            scene,
+            renderer.settings(),
+            self.build.name(),
+            shots,
+            cache,
+            &staged.analysis.effects,
+        );
         self.json.give(&report.text(scene), &report)
     }
 
@@ -232,7 +254,7 @@ impl Args {
         };
         let settings = RenderSettings {
             size,
-            samples: self.samples,
+            samples: self.samples.unwrap_or(1),
             shadows: !self.no_shadows,
             aovs: self.outputs.aovs(),
             tuning,

@@ -244,7 +244,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             threads,
             pinned: outcome.pinned,
             samples: samples as f64 / size.pixels() as f64,
-            effects: EffectCosts::new(appearance.set, &costs, threads),
+            costs: EffectCosts::new(appearance.set, &costs, threads),
         };
         Drawn { first: None, frame, stats }
     }
@@ -322,7 +322,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             threads,
             pinned: outcome.pinned,
             samples: f64::from(self.settings.samples),
-            effects: EffectCosts::default(),
+            costs: EffectCosts::default(),
         }
     }
 }

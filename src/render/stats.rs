@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// Rays of one kind, counted by one worker.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Tally {
+pub struct Tally {
     pub rays: u64,
     /// Time in which the worker made and traced them.
     pub time: Duration,
@@ -87,7 +87,7 @@ pub struct FrameStats {
     pub samples: f64,
     /// What effects cost, if any ran.
     #[serde(skip_serializing_if = "EffectCosts::is_empty")]
-    pub effects: EffectCosts,
+    pub costs: EffectCosts,
 }
 
 #[cfg(test)]

@@ -3,10 +3,11 @@
 //! Amounts are linear RGB. A white surface that faces the key light of [`Lighting::for_view`] and
 //! the sky comes out at about 1, the brightest value that a PNG holds.
 
-use super::Camera;
+use super::{Camera, Emitters};
 use crate::geometry::Ray;
 use crate::traverse::Accel;
 use glam::Vec3;
+use std::f32::consts::PI;
 
 /// The key light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,13 +155,19 @@ impl Lighting {
 }
 
 /// The part of what is seen that is to lie in the key light.
-const ENOUGH: f32 = 0.3;
+pub(super) const ENOUGH: f32 = 0.3;
+
+/// Rays to lights from each point.
+const PROBES: u32 = 8;
+
+/// Light that can be seen on a white surface: about an eighth of a display's brightness.
+const BRIGHT: f32 = 0.015;
 
 /// How far from the eye a lamp is tried, in units of the depth of what is seen.
 const LAMP_DISTANCES: [f32; 4] = [1.0, 0.5, 0.25, 0.1];
 
 /// A coarse grid of what a camera sees.
-struct Seen {
+pub(super) struct Seen {
     /// Points just before the surfaces, and the normals on the eye's side.
     points: Vec<(Vec3, Vec3)>,
     /// The median distance from the eye.
@@ -168,7 +175,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(camera: &Camera, accel: &Accel) -> Self {
+    /// Looks through the camera.
+    pub fn new(camera: &Camera, accel: &Accel) -> Self {
         const GRID: u32 = 16;
         let view = camera.view(GRID, GRID);
         let (mut points, mut depths) = (Vec::new(), Vec::new());
@@ -184,6 +192,29 @@ impl Seen {
         depths.sort_by(f32::total_cmp);
         let median = depths.get(depths.len() / 2).copied().filter(|&depth| depth > 0.0);
         Self { points, depth: median.unwrap_or_else(|| camera.distance()) }
+    }
+
+    /// The part of the points that some surfaces throw light on which can be seen; all of them if there are none.
+    pub fn share_lit_by(&self, emitters: &Emitters, accel: &Accel) -> f32 {
+        let sees = |&&(point, normal): &&(Vec3, Vec3)| {
+            let light: f32 = (0..PROBES)
+                .map(|probe| {
+                    // Each quarter of the lights, and of a light, once.
+                    let along = (probe as f32 + 0.5) / PROBES as f32;
+                    let light = emitters.sample([along, 0.5], [(along * 2.6) % 1.0, (along * 7.3) % 1.0]);
+                    let way = light.position - point;
+                    let squared = way.length_squared();
+                    let cosines = normal.normalize_or_zero().dot(way).max(0.0) * light.normal.dot(way).abs();
+                    if cosines <= 0.0 || accel.occluded(&Ray::segment(point, way, 0.0, 0.999)) {
+                        return 0.0;
+                    }
+                    light.radiance.max_element() * cosines / (squared * squared * light.pdf_area * PI)
+                })
+                .sum();
+            light / PROBES as f32 > BRIGHT
+        };
+        let lit = self.points.iter().filter(sees).count();
+        if self.points.is_empty() { 1.0 } else { lit as f32 / self.points.len() as f32 }
     }
 
     /// The part of the points that a light reaches; all of them if there are none.

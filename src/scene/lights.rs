@@ -1,6 +1,8 @@
 //! All that lights a scene.
 
-use super::{Ambient, Emitters, Environment, Light, Lighting};
+use super::light::{ENOUGH, Seen};
+use super::{Ambient, Camera, Emitters, Environment, Light, Lighting};
+use crate::traverse::Accel;
 use glam::Vec3;
 
 /// Where a picture's light comes from.
@@ -17,9 +19,22 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// Light of which no scene says anything.
-    pub fn of(lighting: &Lighting) -> Self {
-        Self { key: Some(lighting.key), ambient: Some(lighting.ambient), emitters: None, environment: None }
+    /// The light of a scene. One that is lit by its own lights, so that enough of what a camera sees of it is seen
+    /// by them, or by an environment, gets no other; where a few lamps glow on a dashboard, `lighting` is there
+    /// as well.
+    pub fn for_view(
+        camera: &Camera,
+        accel: &Accel,
+        lighting: &Lighting,
+        emitters: Option<Emitters>,
+        environment: Option<Environment>,
+    ) -> Self {
+        let is_lit = environment.is_some()
+            || emitters
+                .as_ref()
+                .is_some_and(|emitters| Seen::new(camera, accel).share_lit_by(emitters, accel) >= ENOUGH);
+        let (key, ambient) = if is_lit { (None, None) } else { (Some(lighting.key), Some(lighting.ambient)) };
+        Self { key, ambient, emitters, environment }
     }
 
     /// What is seen in a direction in which there is nothing.

@@ -4,8 +4,8 @@
 //! it; [`Lighting`] is the light that falls on the scene, [`Environment`] that from infinitely far;
 //! [`Surface`] is what it falls on, [`texture`] the pictures there.
 
-mod cached;
 mod alias;
+mod cached;
 mod camera;
 pub mod effects;
 mod emitters;

@@ -1,11 +1,13 @@
 //! What `render` reports: the scene, the machine's part, and what each frame cost.
 
 use crate::cli::cache_options::CacheReport;
+use crate::cli::looks::callers;
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
 use crate::cli::scene::{Scene, SceneReport};
 use crate::geometry::Accuracy;
-use crate::render::{FirstStats, FrameStats, RayCount, RenderSettings, Size};
+use crate::render::{EffectCosts, FirstStats, FrameStats, RayCount, RenderSettings, Size};
 use crate::scene::Camera;
+use crate::scene::effects::Call;
 use crate::traverse::Kernel;
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -56,6 +58,11 @@ pub struct Report<'a> {
     camera: RayCount,
     shadow: RayCount,
     total: RayCount,
+    /// All effects, whether they ran, and what called for them.
+    effects: &'a [Call],
+    /// What those that ran cost, of all frames together, if the plain renderer did not do.
+    #[serde(skip_serializing_if = "EffectCosts::is_empty")]
+    costs: EffectCosts,
     /// Of a scene that is not all in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     cache: Option<CacheReport>,
@@ -70,6 +77,7 @@ impl<'a> Report<'a> {
         profile: &'a str,
         frames: Vec<Shot>,
         cache: Option<CacheReport>,
+        effects: &'a [Call],
     ) -> Self {
         let sum = |kind: fn(&FrameStats) -> RayCount| {
             let counts = frames.iter().map(|shot| kind(&shot.stats));
@@ -93,6 +101,8 @@ impl<'a> Report<'a> {
             camera: sum(|stats| stats.camera),
             shadow: sum(|stats| stats.shadow),
             total: sum(|stats| stats.total),
+            effects,
+            costs: frames.iter().fold(EffectCosts::default(), |costs, shot| costs.and(&shot.stats.costs)),
             cache,
             frames,
         }
@@ -103,9 +113,13 @@ impl<'a> Report<'a> {
         let mut lines = Lines::default();
         scene.describe(&mut lines);
         lines.add("camera", self.frames[0].camera.to_string());
-        let samples = counted(u64::from(self.samples), "sample");
-        let shadows = if self.shadows { "shadows" } else { "no shadows" };
-        lines.add("picture", format!("{}, {samples} per pixel, {shadows}", self.size));
+        let mut samples = counted(u64::from(self.samples), "sample");
+        let taken = self.frames.iter().map(|shot| shot.stats.samples).sum::<f64>() / self.frames.len() as f64;
+        if taken < f64::from(self.samples) - 0.05 {
+            samples = format!("{taken:.1} of {samples}");
+        }
+        let shadows = if self.shadows { ", shadows" } else { "" };
+        lines.add("picture", format!("{}, {samples} per pixel{shadows}", self.size));
         let Engine { version, build } = ENGINE;
         let pinned = match self.pinned {
             0 => "not pinned".into(),
@@ -132,6 +146,7 @@ impl<'a> Report<'a> {
                 lines.add(kind, rays(&count));
             }
         }
+        self.describe_effects(&mut lines);
         if let Some(cache) = &self.cache {
             cache.describe(&mut lines);
         }
@@ -145,6 +160,23 @@ impl<'a> Report<'a> {
             path => text.push_str(&frame_table(path)),
         }
         text
+    }
+}
+
+impl Report<'_> {
+    /// A line for each effect that ran: its rays, its time, its part of the frame, and what called for it.
+    fn describe_effects(&self, lines: &mut Lines) {
+        let frame = self.total.seconds;
+        for (effect, count) in self.costs.iter() {
+            let cost = if count.rays > 0 || count.seconds > 0.0 {
+                let share = 100.0 * count.seconds / frame;
+                format!("{} rays, {}, {share:.1} %", grouped(count.rays), duration(count.seconds))
+            } else {
+                "no rays of its own".into()
+            };
+            let call = self.effects.iter().find(|call| call.name == effect).expect("all are there");
+            lines.add("effect", format!("{effect:<18} {cost}; {}", callers(call)));
+        }
     }
 }
 

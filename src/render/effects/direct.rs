@@ -60,7 +60,8 @@ impl Direct<'_> {
             add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
         }
         if let Some(emitters) = &self.lights.emitters {
-            let light = emitters.sample(path.random(sequence, Use::Light), path.random(sequence, Use::LightPlace));
+            let light =
+                emitters.sample(path.random(sequence, Use::Light), path.random(sequence, Use::LightPlace));
             let way = light.position - origin;
             let distance = way.length();
             let toward = way / distance;

@@ -17,8 +17,8 @@ pub struct Around<'a> {
     pub lit_by_surfaces: bool,
     /// The picture all around, if there is one.
     pub environment: Option<&'a str>,
-    /// Samples per pixel, at most.
-    pub samples: u32,
+    /// The error at which a pixel has samples enough; 0 if it takes all in any case.
+    pub error: f32,
 }
 
 /// The effects of a scene, and what each was called for by.
@@ -80,7 +80,9 @@ impl Analysis {
                 Effect::DepthOfField if around.camera.aperture > 0.0 => {
                     vec![format!("camera: aperture {}", around.camera.aperture)]
                 }
-                Effect::Antialiasing if around.samples > 1 => vec![format!("{} samples", around.samples)],
+                Effect::Antialiasing if around.error > 0.0 => {
+                    vec![format!("samples until the error is {}", around.error)]
+                }
                 _ => by_materials(&|material| calls_for(material, effect)),
             };
             let asked = request.of(effect);
@@ -164,7 +166,7 @@ mod tests {
         key_light: Some("key light: a sun"),
         lit_by_surfaces: false,
         environment: None,
-        samples: 1,
+        error: 0.0,
     };
 
     fn scene(materials: Vec<Material>, of_triangle: Vec<u32>) -> Mesh {

@@ -19,10 +19,7 @@ const ENDS_EARLY: &str = "is a broken picture: it ends too early";
 /// A model's picture, with the levels that its uses call for.
 pub(super) fn open(image: &Image, uses: Uses) -> Result<Picture, Problem> {
     // The bytes first: a scene file's are checked as a whole, and a decoder that stops early must not hide damage.
-    let decoded = image
-        .source
-        .read()
-        .and_then(|bytes| decode(Cursor::new(&bytes[..]), name_of(image)));
+    let decoded = image.source.read().and_then(|bytes| decode(Cursor::new(&bytes[..]), name_of(image)));
     match decoded {
         Ok(picture) => Ok(Picture::new(picture, uses)),
         Err(message) => Err(Problem { image: image.name.clone(), message: one_line(&message) }),
