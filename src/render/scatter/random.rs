@@ -121,6 +121,21 @@ mod tests {
     }
 
     #[test]
+    fn numbers_stay_what_they_are() {
+        // In units of 2^-24; from a program of its own, bit by bit as the papers say.
+        for (pixel, sample, dimension, expected) in [
+            ([0, 0], 0, 0, [14_329_050, 5_910_790]),
+            ([1, 0], 0, 0, [8_675_049, 1_659_901]),
+            ([0, 1], 1, 3, [16_004_779, 9_264_859]),
+            ([1919, 1079], 4096, 7, [10_308_674, 14_644_080]),
+            ([u32::MAX; 2], u32::MAX, u32::MAX, [9_539_354, 7_338_350]),
+        ] {
+            let found = Sequence::of(pixel, sample).pair(dimension).map(|x| (x * (1 << 24) as f32) as u32);
+            assert_eq!(found, expected, "{pixel:?} {sample} {dimension}");
+        }
+    }
+
+    #[test]
     fn one_is_the_first_of_the_pair() {
         for i in 0..100 {
             let sequence = Sequence::of([i, 9], i * i);
