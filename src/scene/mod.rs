@@ -3,7 +3,6 @@
 //! [`Camera`] says where the eye is; [`View`] makes its rays for one image size; [`Orbit`] moves
 //! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on.
 
-mod alias;
 mod camera;
 mod emitters;
 mod framing;
