@@ -4,7 +4,6 @@
 //! it; [`Lighting`] is the light that falls on the scene, [`Environment`] that from infinitely far;
 //! [`Surface`] is what it falls on, [`texture`] the pictures there.
 
-mod alias;
 mod cached;
 mod camera;
 pub mod effects;
@@ -21,7 +20,7 @@ mod view;
 
 pub use cached::{CachedReader, CachedSurface};
 pub use camera::{Camera, DEFAULT_FOV};
-pub use emitters::{EmitterSample, Emitters};
+pub use emitters::{EmitterSample, Emitters, uniform_triangle};
 pub use environment::{Environment, EnvironmentSample};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use lights::Lights;

@@ -2,11 +2,11 @@
 //! representation of a rough surface for ray reflection", 1975; Walter et al., "Microfacet models for refraction
 //! through rough surfaces", 2007), the same in all directions along the surface.
 //!
-//! Light meets one facet and is gone: what would be thrown from facet to facet is lost, so the rougher a surface, the
-//! darker (for `alpha` = 1 and light from everywhere by less than a half). The terms' names are those of Heitz,
-//! "Understanding the masking-shadowing function in microfacet-based BRDFs" (2014): `D` the density of facets'
-//! normals, `G1` the share of facets that is seen from one direction, `G2` from two, of which the heights of facets are
-//! taken into account.
+//! Light meets one facet and is gone: what would be thrown from facet to facet is lost. That makes rough surfaces
+//! darker, of white ones in light from everywhere by 8 % for an `alpha` of 0.2, 30 % for 0.5 and 59 % for 1. The terms'
+//! names are those of Heitz, "Understanding the masking-shadowing function in microfacet-based BRDFs" (2014): `D` is
+//! the density of facets' normals, `G1` the share of facets that is seen from one direction, `G2` from two, where what
+//! is high is seen from both.
 //!
 //! All directions are in local coordinates. With an `alpha` below [`SMOOTH`] nothing here may be asked: that is a
 //! mirror.
@@ -105,6 +105,9 @@ pub fn sample(wo: Vec3, alpha: f32, uv: [f32; 2]) -> Option<Reflection> {
 /// The normal of one of the facets that are seen from `wo`, which is above the surface: each as often as the area
 /// that it covers as seen from there. Density by solid angle: `G1 D cos(wo, facet) / cos(wo)`.
 ///
+/// Light that goes through the facet instead of being thrown back, and comes from `wi` below the surface, has the
+/// weight [`masking`] of `wi`, beside the share that a facet lets through (Walter et al. 2007: `G2` is `G1 G1`).
+///
 /// The facets are those of a ball that was flattened; seen from `wo`, the visible ones of the ball reflect parallel
 /// light evenly into a cap of the sphere (Dupuy & Benyoub, "Sampling visible GGX normals with spherical caps", 2023).
 #[inline]
@@ -193,7 +196,7 @@ mod tests {
                 let wo = direction(cos, 0.3);
                 let thrown = integral(300, 1, |wi| white(wo, wi, alpha) * wi.z);
                 let sampled = mean(wo, alpha, |s| s.map_or(0.0, |s| s.weight));
-                assert!(thrown < 1.0 && thrown > 0.5, "{alpha} {cos}: {thrown}");
+                assert!(thrown < 1.0 && thrown > 0.3, "{alpha} {cos}: {thrown}");
                 assert!((thrown - sampled).abs() < 3e-3, "{alpha} {cos}: {thrown} {sampled}");
             }
         }
@@ -202,6 +205,14 @@ mod tests {
                 [0.1, 0.03, SMOOTH].map(|a| mean(direction(cos, 1.0), a, |s| s.map_or(0.0, |s| s.weight)));
             assert!(left[0] < left[1] && left[1] < left[2] && left[2] > 0.9999, "{cos}: {left:?}");
         }
+    }
+
+    #[test]
+    fn seen_from_above_the_roughest_throws_back_what_it_should() {
+        // For `alpha` = 1 the sine² of the facets' angle, s, is spread evenly, up to 1/2 light goes up, and its weight
+        // is (1 - 2s) / (1 - s): that adds up to 1 - ln 2.
+        let thrown = mean(Vec3::Z, 1.0, |s| s.map_or(0.0, |s| s.weight));
+        assert!((thrown - (1.0 - std::f64::consts::LN_2)).abs() < 1e-3, "{thrown}");
     }
 
     #[test]

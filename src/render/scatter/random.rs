@@ -61,7 +61,7 @@ fn sobol(index: u32) -> u32 {
     bits ^= (bits >> 8) & 0x00FF_00FF;
     bits ^= (bits >> 4) & 0x0F0F_0F0F;
     bits ^= (bits >> 2) & 0x3333_3333;
-    bits ^ (bits >> 1) & 0x5555_5555
+    bits ^ ((bits >> 1) & 0x5555_5555)
 }
 
 /// Flips each bit or not, by what is in the bits below it: Owen's scrambling of the number with these bits the other
@@ -69,7 +69,7 @@ fn sobol(index: u32) -> u32 {
 /// the constants of Vegdahl ("Building a better LK hash", 2021).
 #[inline]
 fn scramble(bits: u32, seed: u32) -> u32 {
-    // Sums, and products with odd or after even factors, carry upward only.
+    // No step moves a bit downward: sums and products carry upward, and an even product's own bit is one above.
     let mut bits = bits ^ bits.wrapping_mul(0x3D20_ADEA);
     bits = bits.wrapping_add(seed);
     bits = bits.wrapping_mul((seed >> 16) | 1);
@@ -121,6 +121,21 @@ mod tests {
     }
 
     #[test]
+    fn numbers_stay_what_they_are() {
+        // In units of 2^-24; from a program of its own, bit by bit as the papers say.
+        for (pixel, sample, dimension, expected) in [
+            ([0, 0], 0, 0, [14_329_050, 5_910_790]),
+            ([1, 0], 0, 0, [8_675_049, 1_659_901]),
+            ([0, 1], 1, 3, [16_004_779, 9_264_859]),
+            ([1919, 1079], 4096, 7, [10_308_674, 14_644_080]),
+            ([u32::MAX; 2], u32::MAX, u32::MAX, [9_539_354, 7_338_350]),
+        ] {
+            let found = Sequence::of(pixel, sample).pair(dimension).map(|x| (x * (1 << 24) as f32) as u32);
+            assert_eq!(found, expected, "{pixel:?} {sample} {dimension}");
+        }
+    }
+
+    #[test]
     fn one_is_the_first_of_the_pair() {
         for i in 0..100 {
             let sequence = Sequence::of([i, 9], i * i);
@@ -163,7 +178,7 @@ mod tests {
             let pixels = (0..N).map(|i| [0, other].map(|x| Sequence::of([x, 4], i).one(0)));
             // Of the same few samples in pixels side by side, as an image has them.
             let neighbours =
-                (0..N).map(|i| [0, other].map(|x| Sequence::of([i % 128 ^ x, i / 128], 1).one(2)));
+                (0..N).map(|i| [0, other].map(|x| Sequence::of([(i % 128) ^ x, i / 128], 1).one(2)));
             for (what, r) in [correlation(dimensions), correlation(pixels), correlation(neighbours)]
                 .into_iter()
                 .enumerate()

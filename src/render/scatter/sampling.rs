@@ -113,7 +113,7 @@ mod tests {
         // Each direction's weight by its density: the hemisphere's cosine integral over the hemisphere's.
         close(
             mean(300, |uv| cosine_hemisphere(uv).z / cosine_density(cosine_hemisphere(uv).z)),
-            3.141_592_65,
+            std::f64::consts::PI,
         );
         for uv in grid(64).chain([[0.0, 0.0], [0.0, 0.999_999_94], [0.5, 0.0]]) {
             let w = cosine_hemisphere(uv);

@@ -146,7 +146,7 @@ mod tests {
             assert!(offset.z > 0.0);
             // Each projection is beyond the ball, so is their mean. By no more than the farthest of them.
             let reach = (flat + offset).length();
-            assert!(reach >= 1.0 - 1e-6 && reach < 1.25, "{weights:?}: {} to {reach}", flat.length());
+            assert!((1.0 - 1e-6..1.25).contains(&reach), "{weights:?}: {} to {reach}", flat.length());
             // From the inside it is hollow; normals on the other side of the triangle mean the same surface.
             assert_eq!(terminator_offset(BALL, BALL, u, v, Vec3::NEG_Z), Vec3::ZERO);
             assert_eq!(terminator_offset(BALL, BALL.map(|n| -n), u, v, Vec3::Z), offset);
