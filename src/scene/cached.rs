@@ -3,6 +3,7 @@
 use super::surface::{Detail, Look, Surface};
 use crate::cache::{Array, Cached, View};
 use crate::error::Result;
+use crate::kdtree::Tree;
 use crate::mesh::{Attributes, Image, Material, blend, decode};
 use crate::store::{self, ColorMeta, SurfaceRecord};
 use glam::Vec3;

@@ -1,12 +1,8 @@
 //! What shading asks of the triangles that rays hit.
 
-use crate::cache::{Array, Cached, View};
-use crate::error::Result;
-use crate::kdtree::Tree;
-use crate::mesh::{Attributes, Image, Material, Mesh, blend, decode};
-use crate::store::{self, ColorMeta, Stored, SurfaceRecord};
+use crate::mesh::{Attributes, Image, Material, Mesh};
+use crate::store::Stored;
 use glam::Vec3;
-use std::sync::Arc;
 
 /// Surfaces by primitive id: a [`Mesh`], or those of a scene file.
 ///
