@@ -6,9 +6,9 @@ use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{Arrays, BuildParams, KdTree, Tree};
 use crate::mesh::generate::plant::{self, PlantParams};
 use crate::mesh::generate::shapes;
-use crate::mesh::{Colors, Material, Mesh};
+use crate::mesh::{Attributes, Colors, Material, Mesh, Normal};
 use crate::render::{Frame, RenderSettings, Renderer, Size};
-use crate::scene::{CachedSurface, Camera, Lighting, Surface};
+use crate::scene::{CachedSurface, Camera, Lighting, Look, Surface};
 use crate::traverse::{Accel, Kernel};
 use bytemuck::cast_slice;
 use glam::Vec3;
@@ -328,6 +328,57 @@ fn colors_of_all_kinds_come_from_files_as_they_were() {
         let frame = frame_of(&Accel::of_cached(cached), &surface, &scene.resident).expect("can be read");
         assert!(frame == expected, "{:?}", file.meta().colors);
     }
+}
+
+/// What a scene takes at least, as the refusal of less says.
+fn least_mebibytes(file: &crate::store::File) -> usize {
+    let refused = Cached::open(file, &CacheOptions::default(), 1, 0, 1).expect_err("nothing fits a byte");
+    let message = refused.to_string();
+    let least = message.split("at least ").nth(1).and_then(|rest| rest.split(' ').next());
+    least.and_then(|least| least.parse().ok()).expect(&message)
+}
+
+#[test]
+fn texture_coordinates_and_normals_come_and_go_in_blocks() {
+    let mut mesh = shapes::soup(40_000, 5);
+    let count = mesh.triangles.len();
+    let normal = |i: usize| Normal::encode(Vec3::new(i as f32 - 777.0, (i % 13) as f32, 5.0));
+    let attributes =
+        |i| Attributes { uv: [[i as f32, 0.5], [0.0, -(i as f32)], [1e9, 1.0]], normals: [normal(i); 3] };
+    mesh.attributes = (0..count).map(attributes).collect();
+    let material = |i: usize| Material::matt(format!("m{i}"), Vec3::splat(0.1 + 0.2 * i as f32));
+    let of_triangle = (0..count as u32).map(|i| i * 7 % 4).collect();
+    mesh.colors = Colors::PerMaterial { materials: (0..4).map(material).collect(), of_triangle };
+
+    let (_folder, path) = file_of(&mesh);
+    let file = crate::store::File::open(&path).expect("opens");
+    let memory = least_mebibytes(&file) << 20;
+    let options = CacheOptions::default();
+    let cached = Arc::new(Cached::open(&file, &options, memory, 0, 1).expect("the least will do"));
+    assert!(cached.data_bytes() > count * 40 + memory, "all of it fits");
+    let surface = CachedSurface::new(Arc::clone(&cached), &file).expect("whole");
+    let same = |primitive| {
+        let (ours, theirs) =
+            ((&mesh).detail(primitive, 0.2, 0.3), surface.reader().detail(primitive, 0.2, 0.3));
+        assert_eq!(ours, theirs, "{primitive}");
+    };
+    cached.or_error(|| (0..count as u32).chain(0..count as u32).step_by(3).for_each(same)).expect("readable");
+    assert!(cached.take_stats().evictions > 0);
+    assert!(cached.memory_bytes()[1] <= memory);
+}
+
+#[test]
+fn materials_have_their_part_of_the_memory() {
+    let mut mesh = shapes::soup(100, 5);
+    let mut least = |bytes: usize| {
+        let material = Material::matt("m".repeat(bytes), Vec3::ONE);
+        mesh.colors = Colors::PerMaterial { materials: vec![material], of_triangle: vec![0; 100] };
+        let (_folder, path) = file_of(&mesh);
+        least_mebibytes(&crate::store::File::open(&path).expect("opens"))
+    };
+    let [few, many] = [least(10), least(10 + (9 << 20))];
+    // Beside the name, what is more is the checksums of the file, which is longer.
+    assert!((few + 9..few + 11).contains(&many), "{few} and {many} MiB");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `raypack info SCENE`: what is in a model or a scene file, and what its tree is like.
 
 mod file;
+mod surfaces;
 
 use super::histogram::{bars, decades};
 use super::options::BuildOptions;
@@ -9,7 +10,7 @@ use super::scene::{Scene, SceneReport};
 use crate::error::{Error, Result};
 use crate::geometry::Hit;
 use crate::kdtree::TreeStats;
-use crate::mesh::{Colors, Mesh, Shapes};
+use crate::mesh::{Attributes, Mesh, Shapes};
 use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::study::bench::build::count::{Counts, count};
@@ -17,6 +18,7 @@ use crate::study::rays::{RayKind, RaySets, Setup};
 use file::FileReport;
 use serde::Serialize;
 use std::path::PathBuf;
+use surfaces::ColorReport;
 
 /// Say what is in a model or a scene file, and what its tree is like
 #[derive(Clone, Debug, clap::Args)]
@@ -51,28 +53,15 @@ struct Report<'a> {
     validated: bool,
 }
 
-/// Where the triangles' colours come from.
-#[derive(Debug, Serialize)]
-struct ColorReport<'a> {
-    kind: &'static str,
-    /// Names and how many triangles have them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    materials: Vec<MaterialReport<'a>>,
-}
-
-#[derive(Debug, Serialize)]
-struct MaterialReport<'a> {
-    name: &'a str,
-    triangles: u64,
-    diffuse: [f32; 3],
-}
-
 /// Bytes by part.
 #[derive(Debug, Serialize)]
 struct Memory {
     positions: usize,
     indices: usize,
+    /// With materials, and pictures that are not in files of their own.
     colors: usize,
+    /// Texture coordinates and normals.
+    attributes: usize,
     tree_nodes: usize,
     tree_references: usize,
     tree_triangles: usize,
@@ -98,7 +87,7 @@ pub fn run(args: &Args) -> Result<()> {
     let report = Report {
         engine: ENGINE,
         scene: scene.report().with_duplication(&duplication),
-        colors: colors(mesh),
+        colors: ColorReport::new(mesh),
         file: file.as_ref().map(|file| FileReport::new(file, args.verify)),
         memory: memory(mesh, &scene.tree),
         shapes: Shapes::of(mesh),
@@ -119,34 +108,15 @@ fn random_rays(scene: &Scene, mesh: &Mesh) -> Counts {
     count(&scene.accel, &sets.rays(RayKind::Random))
 }
 
-fn colors(mesh: &Mesh) -> ColorReport<'_> {
-    let (kind, materials) = match &mesh.colors {
-        Colors::Uniform(_) => ("uniform", Vec::new()),
-        Colors::PerTriangle(_) => ("per triangle", Vec::new()),
-        Colors::PerVertex(_) => ("per vertex", Vec::new()),
-        Colors::PerMaterial { materials, of_triangle } => {
-            let mut counts = vec![0u64; materials.len()];
-            for &material in of_triangle {
-                counts[material as usize] += 1;
-            }
-            let reports = materials.iter().zip(counts).map(|(material, triangles)| MaterialReport {
-                name: &material.name,
-                triangles,
-                diffuse: material.diffuse.to_array(),
-            });
-            ("per material", reports.collect())
-        }
-    };
-    ColorReport { kind, materials }
-}
-
 fn memory(mesh: &Mesh, tree: &TreeStats) -> Memory {
     let positions = size_of_val(&mesh.positions[..]);
     let indices = size_of_val(&mesh.triangles[..]);
+    let attributes = mesh.attributes.len() * size_of::<Attributes>();
     let mut memory = Memory {
         positions,
         indices,
-        colors: mesh.bytes().saturating_sub(positions + indices),
+        colors: mesh.bytes().saturating_sub(positions + indices + attributes),
+        attributes,
         tree_nodes: tree.node_bytes,
         tree_references: tree.reference_bytes,
         tree_triangles: tree.triangle_bytes,
@@ -208,28 +178,18 @@ fn text(scene: &Scene, report: &Report<'_>, duplication: &[usize]) -> String {
             low.x, low.y, low.z, high.x, high.y, high.z, extent.x, extent.y, extent.z
         ),
     );
-    let materials = &report.colors.materials;
-    let kind = report.colors.kind;
-    if materials.is_empty() {
-        lines.add("colors", kind);
-    } else {
-        lines.add("colors", format!("{kind}, {}", counted(materials.len() as u64, "material")));
-        for material in materials {
-            let [r, g, b] = material.diffuse;
-            let triangles = counted(material.triangles, "triangle");
-            lines.add("", format!("{} ({r:.3} {g:.3} {b:.3}), {triangles}", material.name));
-        }
-    }
+    report.colors.describe(&mut lines);
     let memory = &report.memory;
     let part = |amount: usize| bytes(amount as u64);
     lines.add(
         "memory",
         format!(
-            "{}: positions {}, indices {}, colors {}, tree nodes {}, references {}, triangles {}",
+            "{}: positions {}, indices {}, colors {}, attributes {}, tree nodes {}, references {}, triangles {}",
             part(memory.total),
             part(memory.positions),
             part(memory.indices),
             part(memory.colors),
+            part(memory.attributes),
             part(memory.tree_nodes),
             part(memory.tree_references),
             part(memory.tree_triangles)

@@ -58,6 +58,9 @@ struct Report<'a> {
     file: &'a Path,
     bytes: u64,
     sections: &'a [Section],
+    /// Pictures that could not be read, and what is wrong with them.
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    missing_images: &'a [String],
 }
 
 /// What was read of a model.
@@ -96,6 +99,7 @@ pub fn run(args: &Args) -> Result<()> {
             file: &args.output,
             bytes: large.written.bytes,
             sections: &large.written.sections,
+            missing_images: &large.written.missing_images,
         };
         return args.json.give(&text(&report), &report);
     }
@@ -125,6 +129,7 @@ pub fn run(args: &Args) -> Result<()> {
         file: &args.output,
         bytes: written.bytes,
         sections: &written.sections,
+        missing_images: &written.missing_images,
     };
     args.json.give(&text(&report), &report)
 }
@@ -195,6 +200,9 @@ fn text(report: &Report<'_>) -> String {
     }
     describe_tree(&mut lines, report.tree);
     let time = report.write_seconds.map(|seconds| format!(", in {}", duration(seconds))).unwrap_or_default();
+    for image in report.missing_images {
+        lines.add("missing", image);
+    }
     lines.add("wrote", format!("{}, {}{time}", report.file.display(), bytes(report.bytes)));
     lines.text().to_owned()
 }

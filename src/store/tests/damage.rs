@@ -4,12 +4,10 @@ use super::super::VERSION;
 use super::super::checksum::{BLOCK, of_block, of_table};
 use super::super::out::{Out, length};
 use super::super::section::{ENTRY, Entry, Kind};
+use super::surfaces::*;
 use super::*;
-use crate::cache::{CacheOptions, Cached};
 use crate::files::write_whole;
-use crate::scene::CachedSurface;
 use std::io::{self, Write};
-use std::sync::Arc;
 
 /// The message with which a file is refused when it is opened: one line that begins with its name.
 fn refused(place: &Place, bytes: &[u8]) -> String {
@@ -21,7 +19,7 @@ fn refused(place: &Place, bytes: &[u8]) -> String {
 }
 
 /// Makes all checksums right again, whatever the bytes.
-fn reseal(bytes: &mut [u8]) {
+pub(super) fn reseal(bytes: &mut [u8]) {
     let table = u64::from_le_bytes(bytes[40..48].try_into().expect("eight")) as usize;
     for block in 1..table / BLOCK {
         let sum = of_block(&bytes[block * BLOCK..][..BLOCK]);
@@ -207,7 +205,7 @@ fn a_header_that_lies_is_refused() {
 }
 
 /// What puts something else into the meta section of a scene, and expects the file to be refused.
-fn liar(place: &Place) -> impl Fn(&str, &str, &str) {
+pub(super) fn liar(place: &Place) -> impl Fn(&str, &str, &str) {
     let (bytes, section) = (place.bytes(), *place.open().expect("opens").section(Kind::Meta).expect("there"));
     // Without the white space, so that there is room for lies.
     let json: serde_json::Value = serde_json::from_slice(&bytes[section.range()]).expect("JSON");
@@ -233,33 +231,12 @@ fn a_meta_section_without_sense_is_refused() {
     lie("\"source\"", "\"sauces\"", senseless);
     lie("\"bins\":32", "\"bins\":1", "build.bins");
     lie("\"scale_exponent\":0", "\"scale_exponent\":9999", "2^9999");
-    lie("\"triangles\":300", "\"triangles\":301", "300 elements of triangles, 301 expected");
+    lie("\"vertices\":900", "\"vertices\":901", "900 elements of positions, 901 expected");
     lie("\"triangles\":300", "\"triangles\":-1", senseless);
     lie("per-material", "per-mineral", senseless);
     lie("\"uses\":[150,150]", "\"uses\":[150,151]", "its uses of materials are not those of its triangles");
     lie("\"uses\":[150,150]", "\"uses\":[300]", "its uses of materials are not those of its triangles");
     lie("\"attributes\":false", "\"attributes\":true", "elements of material-of-triangle, 0 expected");
-}
-
-#[test]
-fn pictures_that_have_no_place_are_refused() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let place = Place::with(&rich_meshes(folder.path())[3]);
-    let lie = liar(&place);
-    let senseless = "its meta section makes no sense: ";
-    lie(
-        "\"offset\":10000",
-        "\"offset\":9999",
-        &format!("{senseless}picture scene.glb, image 0 has no place"),
-    );
-    lie("\"bytes\":5000", "\"bytes\":4999", "picture empty.png has no place of its own");
-    lie("\"bytes\":10000", "\"bytes\":18446744073709551615", "picture wood.png has no place of its own");
-    lie("\"bytes\":3", "\"bytes\":4", "15003 elements of images, 15004 expected");
-    lie("\"image\":4", "\"image\":5", "material lamp names a picture that is not there");
-    lie("\"emission\":[12.5,", "\"emission\":[-1,", "its colours are none");
-    lie("\"uses\":[", "\"uses\":[18446744073709551615,", "its uses of materials are not");
-    // The lamp's triangles give off none of it any more.
-    lie("\"emission\":[12.5,0.33333334,1e-9]", "\"emission\":[0,0,0]", "elements of emitters, 0 expected");
 }
 
 #[test]
@@ -296,78 +273,6 @@ fn what_checksums_cannot_know_is_looked_at() {
     }
 }
 
-#[test]
-fn what_checksums_cannot_know_of_surfaces_is_looked_at() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mesh = &rich_meshes(folder.path())[3];
-    let place = Place::with(mesh);
-    let (bytes, sections) = (place.bytes(), place.open().expect("opens").sections().to_vec());
-    // A word of a section, with checksums made right for it.
-    let forged = |kind: Kind, word: usize, value: u32| {
-        let mut bytes = bytes.clone();
-        let at =
-            sections.iter().find(|section| section.kind == kind).expect("there").range().start + 4 * word;
-        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
-        reseal(&mut bytes);
-        place.set(&bytes);
-        place.open().expect("opens")
-    };
-    let both = |file: File, expected: &str| {
-        for result in [file.mesh().map(drop), file.stored().map(drop)] {
-            let message = result.expect_err("it makes no sense").to_string();
-            assert!(message.contains(expected), "{message}");
-        }
-    };
-    both(forged(Kind::SurfaceRecords, 10, 5), "a material that is not there");
-    both(forged(Kind::SurfaceRecords, 10, 0), "other numbers of triangles than it says");
-    both(
-        forged(Kind::SurfaceRecords, 16, f32::NAN.to_bits()),
-        "a texture coordinate of its mesh is not finite",
-    );
-    // Lamps are 2, 6, 10, 13, ...
-    let emitters = |word, value, expected: &str| {
-        let file = forged(Kind::Emitters, word, value);
-        let open = || Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 1).expect("enough");
-        let cached = CachedSurface::new(Arc::new(open()), &file).map(drop);
-        let stored = file.stored().map(drop).expect_err("it makes no sense").to_string();
-        assert!(stored.contains(expected), "{stored}");
-        cached
-    };
-    let none = "its emitters are no list of its triangles";
-    let last = mesh.colors.emitters().len() - 1;
-    for (word, value) in [(1, 2), (1, 1), (0, 1 << 31), (last, 300), (last, u32::MAX)] {
-        let error = emitters(word, value, none).expect_err("it makes no sense").to_string();
-        assert!(error.contains(none), "{error}");
-    }
-    emitters(0, 1, "an emitter's material gives off no light").expect("nobody has looked at the triangles");
-}
-
-#[test]
-fn a_damaged_picture_is_an_error_when_it_is_read() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mesh = &rich_meshes(folder.path())[1];
-    let place = Place::with(mesh);
-    let mut bytes = place.bytes();
-    let section = *place.open().expect("opens").section(Kind::Images).expect("there");
-    // In the first block of the first picture.
-    bytes[section.range().start + 17] ^= 4;
-    place.set(&bytes);
-    let file = place.open().expect("opens");
-    let stored = file.stored().expect("pictures are not looked at yet");
-    let read: Vec<_> = stored.images().iter().map(|image| image.source.read()).collect();
-    let expected =
-        format!("cannot be read: the scene file is damaged at byte {}; build it again", section.offset);
-    assert_eq!(read[0].as_ref().expect_err("it is damaged"), &expected);
-    assert_eq!(read[1].as_deref(), Ok(&[7; 5000][..]));
-    assert!(
-        file.mesh().expect_err("it has all pictures").to_string().contains("its section images is damaged")
-    );
-    // Cut while it is open.
-    let handle = std::fs::OpenOptions::new().write(true).open(&place.path).expect("there");
-    handle.set_len(section.offset).expect("cut");
-    assert!(stored.images()[1].source.read().expect_err("it is cut").starts_with("cannot be read: "));
-}
-
 /// A disk with room for so many bytes.
 struct Disk<W>(W, usize);
 
@@ -398,11 +303,13 @@ fn a_full_disk_leaves_the_old_file_and_nothing_else() {
     let before = place.bytes();
     let array = vec![7; 100_000];
     let sections: [(Kind, &[u8]); 2] = [(Kind::Meta, &array), (Kind::Indices, &[])];
-    let fill = |mut out: Out<'_, _>| {
-        sections.iter().try_for_each(|(kind, bytes)| out.section(*kind, bytes).map(drop))?;
-        out.finish()
+    let write = |room| {
+        write_whole(&place.path, |file| {
+            let mut out = Out::new(Disk(file, room), &|_| ())?;
+            sections.iter().try_for_each(|(kind, bytes)| out.section(*kind, bytes).map(drop))?;
+            out.finish().map(drop)
+        })
     };
-    let write = |room| write_whole(&place.path, |out| fill(Out::new(Disk(out, room), &|_| ())?).map(drop));
     // The first block is written twice.
     let all = length(sections.iter().map(|(_, bytes)| bytes.len())) as usize + BLOCK;
     for room in [0, 100, BLOCK, 65_536, 150_000, all - BLOCK, all - 1] {

@@ -2,8 +2,10 @@
 
 use super::super::large::{self, Progress};
 use super::super::{Kind, Meta};
+use super::surfaces::*;
 use super::*;
 use crate::kdtree::Tree;
+use crate::mesh::Maps;
 use crate::mesh::spooled::SpooledMesh;
 use std::collections::BTreeMap;
 

@@ -3,14 +3,15 @@
 mod damage;
 mod large;
 mod round_trip;
+mod surfaces;
 
 use super::{File, Written};
 use crate::error::Result;
 use crate::kdtree::{BuildParams, KdTree};
 use crate::mesh::generate::shapes;
-use crate::mesh::{Attributes, Channel, Colors, Image, ImageSource, Map, Maps, Material, Mesh, Normal};
+use crate::mesh::{Colors, Material, Mesh};
 use glam::Vec3;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// A mesh of some hundred triangles, with colours of each kind.
@@ -28,90 +29,6 @@ fn meshes() -> Vec<Mesh> {
         },
     ];
     colors.into_iter().map(|colors| Mesh { colors, ..mesh.clone() }).collect()
-}
-
-/// The same with all else that a mesh can have: textured materials that give off light, and what is not matt.
-fn rich_meshes(folder: &Path) -> Vec<Mesh> {
-    meshes().into_iter().map(|mesh| enriched(mesh, folder)).collect()
-}
-
-/// A mesh with attributes, and with pictures of each kind; if it has materials, with ones that do everything.
-fn enriched(mut mesh: Mesh, folder: &Path) -> Mesh {
-    let count = mesh.triangles.len();
-    let number = |i: usize, k: usize| ((i * k) % 997) as f32 / 31.0 - 7.0;
-    let normal = |i, k| Normal::encode(Vec3::new(number(i, k), number(i, k + 1), number(i, k + 2)));
-    mesh.attributes = (0..count)
-        .map(|i| match i % 7 {
-            0 => Attributes::NONE,
-            _ => Attributes {
-                uv: [1, 2, 3].map(|k| [number(i, k), number(i, 5 * k)]),
-                normals: [7, 11, 13].map(|k| normal(i, k)),
-            },
-        })
-        .collect();
-    let file = folder.join("wood.png");
-    std::fs::write(&file, (0..10_000u32).map(|i| (i * i >> 3) as u8).collect::<Vec<_>>()).expect("written");
-    let image = |name: &str, source| Image { name: name.into(), source };
-    mesh.images = vec![
-        image("wood.png", ImageSource::File(file)),
-        image("scene.glb, image 0", ImageSource::Bytes(vec![7; 5000].into())),
-        image("empty.png", ImageSource::Bytes(Vec::new().into())),
-        image("lost.png", ImageSource::Missing("is not there".into())),
-        image("last \"one\".jpg", ImageSource::Bytes(vec![1, 2, 3].into())),
-    ];
-    if let Colors::PerMaterial { materials, of_triangle } = &mut mesh.colors {
-        materials.extend([lamp(), glass(), Material::matt("unused", Vec3::ONE)]);
-        of_triangle.iter_mut().enumerate().for_each(|(i, material)| *material = (i % 11 % 4) as u32);
-    }
-    mesh
-}
-
-fn lamp() -> Material {
-    let map =
-        |image, channel| Some(Map { scale: [2.0, 0.1], offset: [-0.3, 1e-7], ..Map::whole(image, channel) });
-    Material {
-        place: "lamp.mtl:3".into(),
-        emission: Vec3::new(12.5, 1.0 / 3.0, 1e-9),
-        unlit: true,
-        cutoff: Some(0.5),
-        maps: Maps { emission: map(0, Channel::Color), opacity: map(4, Channel::Alpha), ..Maps::default() },
-        ..Material::matt("lamp", Vec3::ZERO)
-    }
-}
-
-fn glass() -> Material {
-    let map = |image, channel| Some(Map { clamp: true, strength: 0.7, ..Map::whole(image, channel) });
-    Material {
-        specular: Vec3::splat(0.04),
-        roughness: 0.125,
-        reflects: true,
-        fresnel: true,
-        transmission: Vec3::new(0.9, 1.0, 0.95),
-        ior: 1.52,
-        absorption: Vec3::new(0.1, 0.0, 3e5),
-        opacity: 0.75,
-        maps: Maps {
-            diffuse: map(1, Channel::Color),
-            specular: map(3, Channel::Data),
-            roughness: map(0, Channel::Green),
-            normal: map(1, Channel::Data),
-            bump: map(2, Channel::Grey),
-            ..Maps::default()
-        },
-        ..Material::matt("glass", Vec3::splat(0.01))
-    }
-}
-
-/// What is read of a mesh that was written: pictures are where the scene file is.
-fn as_read(mesh: &Mesh) -> Mesh {
-    let mut mesh = mesh.clone();
-    for image in &mut mesh.images {
-        image.source = match image.source.read() {
-            Ok(bytes) => ImageSource::Bytes(bytes.into_owned().into()),
-            Err(why) => ImageSource::Missing(why),
-        };
-    }
-    mesh
 }
 
 fn build(mesh: &Mesh) -> KdTree {

@@ -1,9 +1,11 @@
 //! What is written comes back.
 
 use super::super::{BLOCK, Kind, VERSION};
+use super::surfaces::*;
 use super::*;
 use crate::cache::{CacheOptions, Cached};
 use crate::kdtree::Tree;
+use crate::mesh::{Attributes, Channel, Map};
 use crate::scene::{CachedSurface, Look, Surface};
 use std::sync::{Arc, Mutex};
 
@@ -51,12 +53,8 @@ fn surfaces_come_back_to_the_bit() {
         let place = Place::with(&mesh);
         let file = place.open().expect("opens");
         same_surfaces(&mesh, &file.stored().expect("surfaces"));
-        // As little memory as does: what a triangle has comes and goes.
-        let open = |memory| Cached::open(&file, &CacheOptions::default(), memory, 0, 2);
-        let least = open(1).expect_err("nothing fits a byte").to_string();
-        let least =
-            least.split("at least ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a number");
-        let cached = Arc::new(open(least.parse::<usize>().expect("a number") << 20).expect("the least"));
+        let cached = Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 2).expect("enough");
+        let cached = Arc::new(cached);
         let surface = CachedSurface::new(Arc::clone(&cached), &file).expect("surfaces");
         // It is read, and the old file, when another has taken the name.
         place.write(&meshes()[0], &build(&mesh)).expect("written");
@@ -83,48 +81,6 @@ fn same_surfaces(mesh: &Mesh, surface: &impl Surface) {
             assert_eq!(theirs.detail(primitive, u, v), ours.detail(primitive, u, v));
         }
     }
-}
-
-#[test]
-fn a_picture_that_cannot_be_read_is_missing_and_said() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mesh = rich_meshes(folder.path()).remove(3);
-    let tree = build(&mesh);
-    let place = Place::new();
-    std::fs::remove_file(folder.path().join("wood.png")).expect("it was there");
-    let written = place.write(&mesh, &tree).expect("written all the same");
-    let [said] = &written.missing_images[..] else { panic!("{:?}", written.missing_images) };
-    assert!(said.starts_with("wood.png cannot be read: ") && !said.contains('\n'), "{said}");
-    let file = place.open().expect("opens");
-    assert!(
-        matches!(&file.images()[0].source, ImageSource::Missing(why) if why.starts_with("cannot be read"))
-    );
-    assert_eq!(file.mesh().expect("a mesh"), as_read(&mesh));
-    // It was missing before when the scene is written once more.
-    let mesh = file.mesh().expect("a mesh");
-    assert!(place.write(&mesh, &tree).expect("written").missing_images.is_empty());
-}
-
-#[test]
-fn a_scene_has_the_sections_that_it_calls_for() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let has = |mesh: &Mesh, kind| Place::with(mesh).open().expect("opens").section(kind).map(|s| s.count);
-    for (plain, rich) in meshes().iter().zip(rich_meshes(folder.path())) {
-        let materials = !plain.colors.materials().is_empty();
-        assert_eq!(has(plain, Kind::MaterialOfTriangle), materials.then_some(300));
-        assert_eq!(has(&rich, Kind::MaterialOfTriangle), None);
-        assert_eq!((has(plain, Kind::SurfaceRecords), has(&rich, Kind::SurfaceRecords)), (None, Some(300)));
-        let lamps = (0..300).filter(|i| i % 11 % 4 == 2).count() as u64;
-        assert_eq!(
-            (has(plain, Kind::Emitters), has(&rich, Kind::Emitters)),
-            (None, materials.then_some(lamps))
-        );
-        assert_eq!((has(plain, Kind::Images), has(&rich, Kind::Images)), (None, Some(15_003)));
-    }
-    // Lights without attributes.
-    let bare = Mesh { attributes: Vec::new(), ..rich_meshes(folder.path()).remove(3) };
-    assert_eq!(has(&bare, Kind::SurfaceRecords), None);
-    assert!(has(&bare, Kind::Emitters).is_some() && has(&bare, Kind::MaterialOfTriangle).is_some());
 }
 
 #[test]
