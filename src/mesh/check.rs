@@ -69,6 +69,9 @@ fn drop_degenerate(mesh: &mut Mesh, report: &mut ReadReport) {
         Colors::PerMaterial { of_triangle, .. } => retain_where(of_triangle, |i| sound(&triangles[i])),
         Colors::Uniform(_) | Colors::PerVertex(_) => {}
     }
+    if !mesh.attributes.is_empty() {
+        retain_where(&mut mesh.attributes, |i| sound(&triangles[i]));
+    }
     mesh.triangles.retain(sound);
 }
 
