@@ -38,7 +38,7 @@ pub(super) enum Unusable {
     NonFinite(NonFinite),
 }
 
-/// Applies the policy of this module to `mesh`, whose indices and colours are in range, and adds
+/// Applies the policy of this module to `mesh`, whose indices, colours and attributes are in range, and adds
 /// what it did to `report`.
 pub(super) fn check(mut mesh: Mesh, report: &mut ReadReport) -> Result<Mesh, Unusable> {
     drop_degenerate(&mut mesh, report);
@@ -68,6 +68,9 @@ fn drop_degenerate(mesh: &mut Mesh, report: &mut ReadReport) {
         Colors::PerTriangle(colors) => retain_where(colors, |i| sound(&triangles[i])),
         Colors::PerMaterial { of_triangle, .. } => retain_where(of_triangle, |i| sound(&triangles[i])),
         Colors::Uniform(_) | Colors::PerVertex(_) => {}
+    }
+    if !mesh.attributes.is_empty() {
+        retain_where(&mut mesh.attributes, |i| sound(&triangles[i]));
     }
     mesh.triangles.retain(sound);
 }
@@ -137,6 +140,7 @@ fn retain_where<T>(items: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Attributes;
 
     fn points(xs: &[f32]) -> Vec<Vec3> {
         xs.iter().map(|&x| Vec3::new(x, x * x, 0.0)).collect()
@@ -148,15 +152,18 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_triangles_go_with_their_colors() {
+    fn degenerate_triangles_go_with_what_they_have() {
+        let uv = |x: f32| Attributes { uv: [[x; 2]; 3], ..Attributes::NONE };
         let mesh = Mesh {
             positions: points(&[0.0, 1.0, 2.0, 3.0]),
             triangles: vec![[0, 0, 1], [0, 1, 2], [1, 2, 1], [1, 2, 3]],
             colors: Colors::PerTriangle(vec![[1; 3], [2; 3], [3; 3], [4; 3]]),
+            attributes: [1.0, 2.0, 3.0, 4.0].map(uv).to_vec(),
             ..Mesh::default()
         };
         let (mesh, report) = checked(mesh).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [1, 2, 3]]);
+        assert_eq!(mesh.attributes, [2.0, 4.0].map(uv));
         assert_eq!(mesh.colors, Colors::PerTriangle(vec![[2; 3], [4; 3]]));
         assert_eq!((report.degenerate_triangles, report.triangles), (2, 2));
     }

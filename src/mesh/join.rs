@@ -1,18 +1,24 @@
 //! Several meshes made one.
 
 use super::color::{decode, encode};
-use super::{Colors, MAX_TRIANGLES, Material, Mesh};
+use super::{Attributes, Colors, MAX_TRIANGLES, Material, Mesh};
 use crate::error::{Error, Result};
 use glam::Vec3;
 use std::collections::HashMap;
 use std::mem::discriminant;
 
 impl Mesh {
-    /// All triangles of several meshes, mesh after mesh; each keeps its colours.
+    /// All triangles of several meshes, mesh after mesh; each keeps its colours, materials, pictures, texture
+    /// coordinates and normals.
     ///
     /// Where meshes have colours of different kinds, they become materials, which changes none of them. If a mesh
-    /// has them by vertex, they all do: then a vertex between triangles of several colours is there several
-    /// times, and materials are rounded to the 8 bits of a vertex's colour.
+    /// has them by vertex, and no other a material that is more than a colour, they all have them by vertex: then a
+    /// vertex between triangles of several colours is there several times, and materials are rounded to the 8 bits
+    /// of a vertex's colour.
+    ///
+    /// If a mesh has a material that is more than a colour (it shines, lets light through, has a picture), no material
+    /// is given up: a mesh with colours by vertex then gets one material for each colour that its triangles have on
+    /// average, rounded to 32 steps a channel, so that there are 32768 of them at most.
     ///
     /// # Errors
     /// There are more triangles or vertices than one mesh can have.
@@ -26,14 +32,28 @@ impl Mesh {
                 "{triangles} triangles with {vertices} vertices are more than one scene can have: leave models out"
             )));
         }
+        let with_attributes = meshes.iter().any(|mesh| !mesh.attributes.is_empty());
         let mut meshes = meshes.into_iter();
         let mut all = meshes.next().unwrap_or_default();
         all.positions.reserve_exact(vertices - all.positions.len());
         all.triangles.reserve_exact(triangles - all.triangles.len());
-        for mesh in meshes {
-            let first = all.positions.len() as u32;
+        if with_attributes {
+            all.attributes.reserve_exact(triangles - all.attributes.len());
+            all.attributes.resize(all.triangles.len(), Attributes::NONE);
+        }
+        for mut mesh in meshes {
+            let (first, first_image) = (all.positions.len() as u32, all.images.len() as u32);
             all.positions.extend(mesh.positions);
             all.triangles.extend(mesh.triangles.into_iter().map(|corners| corners.map(|i| first + i)));
+            if with_attributes {
+                all.attributes.extend(mesh.attributes);
+                all.attributes.resize(all.triangles.len(), Attributes::NONE);
+            }
+            if let Colors::PerMaterial { materials, .. } = &mut mesh.colors {
+                let maps = materials.iter_mut().flat_map(|material| material.maps.all_mut());
+                maps.for_each(|map| map.image += first_image);
+            }
+            all.images.extend(mesh.images);
             append(&mut all.colors, mesh.colors);
         }
         Ok(all)
@@ -67,7 +87,12 @@ fn unify(meshes: &mut [Mesh]) {
     if meshes.windows(2).all(alike) {
         return;
     }
-    let by_vertex = meshes.iter().any(|mesh| matches!(mesh.colors, Colors::PerVertex(_)));
+    let more = |mesh: &Mesh| match &mesh.colors {
+        Colors::PerMaterial { materials, .. } => materials.iter().any(is_more_than_a_color),
+        _ => false,
+    };
+    let by_vertex =
+        meshes.iter().any(|mesh| matches!(mesh.colors, Colors::PerVertex(_))) && !meshes.iter().any(more);
     for mesh in meshes {
         if by_vertex {
             to_vertices(mesh);
@@ -77,28 +102,45 @@ fn unify(meshes: &mut [Mesh]) {
     }
 }
 
-/// Makes colours that are not by vertex materials, a material for each colour.
+/// Whether a matt surface of its diffuse colour would look different.
+fn is_more_than_a_color(material: &Material) -> bool {
+    let Material { unlit, specular, transmission, opacity, emission, maps, .. } = material;
+    *unlit
+        || *opacity < 1.0
+        || [specular, transmission, emission].iter().any(|light| **light != Vec3::ZERO)
+        || maps.all().next().is_some()
+}
+
+/// Makes colours materials, a material for each colour.
 fn to_materials(mesh: &mut Mesh) {
-    let unnamed = |diffuse| Material::matt("", diffuse);
     let (materials, of_triangle) = match &mesh.colors {
-        Colors::Uniform(color) => (vec![unnamed(*color)], vec![0; mesh.triangles.len()]),
-        Colors::PerTriangle(colors) => {
-            let mut numbers = HashMap::new();
-            let mut materials = Vec::new();
-            let number = |color: &[u8; 3]| {
-                *numbers.entry(*color).or_insert_with(|| {
-                    let [r, g, b] = color;
-                    let name = format!("#{r:02x}{g:02x}{b:02x}");
-                    materials.push(Material::matt(name, decode(*color)));
-                    materials.len() as u32 - 1
-                })
-            };
-            let of_triangle = colors.iter().map(number).collect();
-            (materials, of_triangle)
-        }
-        Colors::PerVertex(_) | Colors::PerMaterial { .. } => return,
+        Colors::Uniform(color) => (vec![Material::matt("", *color)], vec![0; mesh.triangles.len()]),
+        Colors::PerTriangle(colors) => by_color(colors.iter().copied()),
+        Colors::PerVertex(colors) => by_color(mesh.triangles.iter().map(|corners| average(corners, colors))),
+        Colors::PerMaterial { .. } => return,
     };
     mesh.colors = Colors::PerMaterial { materials, of_triangle };
+}
+
+/// A material for each of the triangles' colours, named after it, and which of them each has.
+fn by_color(colors: impl Iterator<Item = [u8; 3]>) -> (Vec<Material>, Vec<u32>) {
+    let mut numbers = HashMap::new();
+    let mut materials = Vec::new();
+    let number = |color: [u8; 3]| {
+        *numbers.entry(color).or_insert_with(|| {
+            let [r, g, b] = color;
+            materials.push(Material::matt(format!("#{r:02x}{g:02x}{b:02x}"), decode(color)));
+            materials.len() as u32 - 1
+        })
+    };
+    let of_triangle = colors.map(number).collect();
+    (materials, of_triangle)
+}
+
+/// The colour between those of three vertices, in 32 steps a channel.
+fn average(corners: &[u32; 3], colors: &[[u8; 3]]) -> [u8; 3] {
+    let sum: Vec3 = corners.iter().map(|&vertex| decode(colors[vertex as usize])).sum();
+    encode(sum / 3.0).map(|byte| ((u32::from(byte) * 31 + 127) / 255 * 255 / 31) as u8)
 }
 
 /// Gives vertices the colours of their triangles.
@@ -131,6 +173,7 @@ fn to_vertices(mesh: &mut Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::{Channel, Image, ImageSource, Map, Maps};
 
     /// Two triangles of a square at a height.
     fn square(height: f32, colors: Colors) -> Mesh {
@@ -190,6 +233,60 @@ mod tests {
         let alone = square(0.0, kinds()[3].clone());
         assert_eq!(Mesh::join(vec![alone.clone()]).expect("fits"), alone);
         assert_eq!(Mesh::join(Vec::new()).expect("fits"), Mesh::default());
+    }
+
+    #[test]
+    fn materials_that_are_more_than_a_color_are_kept_whole() {
+        let [uniform, _, by_vertex, _] = kinds();
+        let image = |name: &str| Image { name: name.into(), source: ImageSource::Missing("a test".into()) };
+        let painted = |name: &str| {
+            let maps = Maps { diffuse: Some(Map::whole(0, Channel::Color)), ..Maps::default() };
+            let lamp = Material { emission: Vec3::splat(20.0), maps, ..named(name, Vec3::ONE) };
+            let colors = Colors::PerMaterial { materials: vec![lamp], of_triangle: vec![0, 0] };
+            Mesh { images: vec![image(name)], ..square(0.0, colors) }
+        };
+        let (one, two) = (painted("one"), painted("two"));
+        let parts = [square(0.0, by_vertex), one.clone(), square(0.0, uniform), two.clone()];
+        let all = Mesh::join(parts.to_vec()).expect("fits");
+        assert_eq!(all.images, [image("one"), image("two")]);
+        let Colors::PerMaterial { materials, of_triangle } = all.colors else { panic!("materials") };
+        assert_eq!(of_triangle, [0, 1, 2, 2, 3, 3, 4, 4]);
+        assert_eq!(
+            Colors::PerMaterial { materials: vec![materials[2].clone()], of_triangle: vec![0, 0] },
+            one.colors
+        );
+        let image_of = |material: &Material| material.maps.diffuse.as_ref().map(|map| map.image);
+        assert_eq!((image_of(&materials[2]), image_of(&materials[4])), (Some(0), Some(1)));
+        // A third of red, green and blue each; and of red, green and next to black.
+        let average = |primitive: usize| materials[of_triangle[primitive] as usize].diffuse;
+        assert!((average(0) - 1.0 / 3.0).abs().max_element() < 0.03, "{}", average(0));
+        assert!(
+            (average(1) - Vec3::new(1.0 / 3.0, 1.0 / 3.0, 0.0)).abs().max_element() < 0.03,
+            "{}",
+            average(1)
+        );
+    }
+
+    #[test]
+    fn averages_take_32_steps() {
+        let steps: std::collections::BTreeSet<u8> =
+            (0..=255).map(|byte| average(&[0, 0, 0], &[[byte; 3]])[0]).collect();
+        assert_eq!((steps.len(), steps.first(), steps.last()), (32, Some(&0), Some(&255)));
+    }
+
+    #[test]
+    fn attributes_stay_with_their_triangles() {
+        let some = Attributes { uv: [[0.5; 2]; 3], ..Attributes::NONE };
+        let with = Mesh { attributes: vec![Attributes::NONE, some], ..square(0.0, Colors::default()) };
+        let without = square(0.0, kinds()[2].clone());
+        let none = Attributes::NONE;
+        let joined = |parts: &[&Mesh]| {
+            let parts = parts.iter().map(|&mesh| mesh.clone()).collect();
+            Mesh::join(parts).expect("fits").attributes
+        };
+        assert_eq!(joined(&[&with, &without, &with]), [none, some, none, none, none, some]);
+        assert_eq!(joined(&[&without, &with]), [none, none, none, some]);
+        assert_eq!(joined(&[&without, &without]), []);
     }
 
     #[test]

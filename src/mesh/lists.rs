@@ -10,6 +10,9 @@ pub(super) trait Lists {
     /// A list.
     type Of<T: Pod>: List<T>;
 
+    /// Whether there is room for what triangles' corners have beside their places: what is not in memory has none.
+    const ATTRIBUTES: bool;
+
     /// An empty list.
     ///
     /// # Errors
@@ -44,6 +47,7 @@ pub(super) struct InMemory;
 
 impl Lists for InMemory {
     type Of<T: Pod> = Vec<T>;
+    const ATTRIBUTES: bool = true;
 
     fn list<T: Pod>(&self) -> io::Result<Vec<T>> {
         Ok(Vec::new())
@@ -70,6 +74,7 @@ pub(super) struct InFiles(pub PathBuf);
 
 impl Lists for InFiles {
     type Of<T: Pod> = Spool<T>;
+    const ATTRIBUTES: bool = false;
 
     fn list<T: Pod>(&self) -> io::Result<Spool<T>> {
         Spool::new(&self.0)

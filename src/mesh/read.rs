@@ -51,6 +51,16 @@ pub struct ReadReport {
     pub unknown_materials: Vec<String>,
     /// MTL lines that made no sense and were left out.
     pub bad_material_lines: u64,
+    /// Texture coordinates that were no finite numbers; they are 0.
+    pub bad_texture_coordinates: u64,
+    /// Normals without a direction; where they are used, triangles are flat.
+    pub bad_normals: u64,
+    /// Vertex colours that were left out because materials do more.
+    pub unused_vertex_colors: u64,
+    /// Pictures that materials name and that are not there.
+    pub missing_textures: Vec<String>,
+    /// Pictures that materials name outside of the model's folder; they are not opened.
+    pub outside_textures: Vec<String>,
     /// Bytes after the last element that the header announces.
     pub trailing_bytes: u64,
 }
@@ -70,6 +80,9 @@ impl ReadReport {
             (self.unused_non_finite, "unused vertex", "NaN or infinite"),
             (self.uncolored_vertices, "vertex", "without a colour made grey"),
             (self.bad_material_lines, "MTL line", "not understood"),
+            (self.bad_texture_coordinates, "texture coordinate", "not finite made 0"),
+            (self.bad_normals, "normal", "without a direction ignored"),
+            (self.unused_vertex_colors, "vertex colour", "left out for materials that do more"),
             (self.trailing_bytes, "byte", "after the end of the data ignored"),
         ];
         let mut parts: Vec<String> = counted
@@ -80,10 +93,14 @@ impl ReadReport {
         let named = [
             ("material file", "not found", &self.missing_material_files),
             ("material", "not defined", &self.unknown_materials),
+            ("texture", "not found", &self.missing_textures),
+            ("texture", "outside of the model's folder left out", &self.outside_textures),
         ];
         for (noun, what, names) in named.iter().filter(|(.., names)| !names.is_empty()) {
             let mut part = format!("{} {what}: ", plural(noun, names.len() as u64));
-            part.push_str(&names.iter().take(3).cloned().collect::<Vec<_>>().join(", "));
+            // A name may be anything: what would end the line, or steer a terminal, is not shown.
+            let shown = names.iter().take(3).map(|name| name.replace(char::is_control, "?"));
+            part.push_str(&shown.collect::<Vec<_>>().join(", "));
             if names.len() > 3 {
                 let _ = write!(part, " and {} more", names.len() - 3);
             }

@@ -1,7 +1,8 @@
 //! Meshes in files, for who cannot have them in memory.
 //!
 //! A PLY file is read from its beginning to its end, and what it holds goes to files on the way; checking it is
-//! some passes over these. What comes out is the mesh that [`read`](super::read()) gives, triangle by triangle.
+//! some passes over these. What comes out is the mesh that [`read`](super::read()) gives, triangle by triangle, without
+//! texture coordinates and normals.
 
 use super::check::{MAX_TRIANGLES, NonFinite, Unusable};
 use super::lists::InFiles;

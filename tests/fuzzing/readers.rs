@@ -73,10 +73,16 @@ fn check(loaded: Result<Loaded, Error>) {
             assert_eq!(of_triangle.len(), triangles);
             assert!(of_triangle.iter().all(|&material| (material as usize) < materials.len()));
             for material in materials {
-                assert!(material.diffuse.to_array().iter().all(|c| (0.0..=1.0).contains(c)), "{material:?}");
+                assert_eq!(material.fault(), None, "{material:?}");
+                let images = mesh.images.len();
+                assert!(material.maps.all().all(|map| (map.image as usize) < images), "{material:?}");
             }
         }
     }
+    assert!(mesh.attributes.is_empty() || mesh.attributes.len() == triangles);
+    assert!(
+        mesh.attributes.iter().flat_map(|attributes| attributes.uv.as_flattened()).all(|x| x.is_finite())
+    );
     let last = triangles as u32 - 1;
     assert!(mesh.color(0, 0.25, 0.25).is_finite() && mesh.color(last, 0.25, 0.25).is_finite());
     assert!(!report.summary().contains('\n'), "{:?}", report.summary());

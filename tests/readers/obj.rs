@@ -1,8 +1,8 @@
-//! Wavefront OBJ and MTL.
+//! Wavefront OBJ.
 
 use super::{Folder, SQUARE, assert_says, read, refusal};
 use raypack::Vec3;
-use raypack::mesh::{self, Colors};
+use raypack::mesh::{self, Attributes, Colors, Normal};
 
 #[test]
 fn polygons_become_fans() {
@@ -16,9 +16,84 @@ fn polygons_become_fans() {
 #[test]
 fn every_form_of_index_is_understood() {
     let faces = "vt 0 0\nvn 0 0 1\nf 1 2 3\nf 1/1 2/1 3/1\nf 1//1 2//1 3//1\nf 1/1/1 2/1/1 3/1/1\n\
-                 f -4 -3 -2\nf 1/9999999999/-7 2/0 3/x\n";
+                 f -4 -3 -2\nf -4/-1/-1 2/1/ 3/\n";
     let mesh = read("a.obj", format!("{SQUARE}{faces}")).mesh;
-    assert_eq!(mesh.triangles, [[0, 1, 2]; 6], "normals and texture coordinates do not matter");
+    assert_eq!(mesh.triangles, [[0, 1, 2]; 6], "texture coordinates and normals make no other vertices");
+}
+
+const LOOKS: &str = "vt 0.5 0.25\nvt 1 2 3\nvt 7\nvn 0 0 2\nvn 1 0 0\nvn 0 -3 0\n";
+
+/// What the file's three `vt` and `vn` say, by number; 0 is none.
+fn corners(uv: [usize; 3], normals: [usize; 3]) -> Attributes {
+    Attributes {
+        uv: uv.map(|i| [[0.0, 0.0], [0.5, 0.25], [1.0, 2.0], [7.0, 0.0]][i]),
+        normals: normals.map(|i| [Vec3::ZERO, Vec3::Z, Vec3::X, Vec3::NEG_Y].map(Normal::encode)[i]),
+    }
+}
+
+#[test]
+fn texture_coordinates_and_normals_stay_with_their_corners() {
+    let faces = "f 1 2 3\no x\nf 1/1/3 2/2/2 3/3/1 4/2/1\ns 1\nf 1 2 2\nusemtl y\nf 1//1 2/2 -2/-1/-2\nf 1 2 4\nf 1/1 2/2\n";
+    let loaded = read("a.obj", format!("{SQUARE}{LOOKS}{faces}"));
+    assert_eq!(loaded.mesh.triangles.len(), 5, "and one without area, and one of two corners");
+    let expected = [
+        corners([0; 3], [0; 3]),
+        corners([1, 2, 3], [3, 2, 1]),
+        corners([1, 3, 2], [3, 1, 1]),
+        corners([0, 2, 3], [1, 0, 2]),
+        corners([0; 3], [0; 3]),
+    ];
+    assert_eq!(loaded.mesh.attributes, expected);
+    assert!(read("a.obj", format!("{SQUARE}{LOOKS}f 1 2 3\nf 1/ 2// 3\n")).mesh.attributes.is_empty());
+}
+
+#[test]
+fn attributes_follow_their_triangles_through_any_file() {
+    // Faces of all sizes in groups and materials: all corners of a face have its number and size for coordinates.
+    let mut file: String = (0..9).map(|x| format!("v {x} 0 0\n")).collect();
+    let mut expected = Vec::new();
+    for face in 0..200 {
+        let size = 1 + (face * 7) % 9;
+        file += &format!("vt {face} {size}\n");
+        file += ["o a\n", "usemtl x\n", "g\n", "s off\n", "usemtl y\n"][face % 5];
+        let corners = (1..=size).map(|corner| format!(" {corner}/-1"));
+        file += &format!("f{}\n", corners.collect::<String>());
+        let fan = (2..size).map(|last| [0, last - 1, last].map(|x| x as f32));
+        expected.extend(fan.map(|xs| (xs, [[face as f32, size as f32]; 3])));
+    }
+    let mesh = read("a.obj", file).mesh;
+    let found = mesh.attributes.iter().enumerate();
+    let found = found.map(|(i, attributes)| (mesh.corners(i as u32).map(|p| p.x), attributes.uv));
+    assert_eq!(found.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn texture_coordinates_and_normals_that_are_none_are_counted() {
+    let looks = "vt nan 1\nvt 1 inf\nvn 0 0 0\nvn nan 0 1\nvn 0 1 0\n";
+    let loaded = read("a.obj", format!("{SQUARE}{looks}f 1/1/1 2/2/2 3/1/3\n"));
+    assert_eq!(loaded.mesh.attributes[0].uv, [[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+    assert_eq!(loaded.mesh.attributes[0].normals, [Normal::NONE, Normal::NONE, Normal::encode(Vec3::Y)]);
+    assert_says(
+        &loaded.report.summary(),
+        &["2 texture coordinates not finite made 0", "2 normals without a direction ignored"],
+    );
+}
+
+#[test]
+fn vertex_colors_count_unless_materials_do_more() {
+    let folder = Folder::new();
+    folder.put("a.mtl", "newmtl plain\nKd 1 0 0\nKs 0.5\nillum 2\nnewmtl lamp\nKd 0\nKe 9\n");
+    let colored = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n";
+    let of = |material: &str| {
+        let file = format!("mtllib a.mtl\n{colored}usemtl {material}\nf 1 2 3\n");
+        mesh::read(folder.put("a.obj", file)).unwrap()
+    };
+    let plain = of("plain");
+    assert!(matches!(plain.mesh.colors, Colors::PerVertex(_)));
+    assert_eq!(plain.report.summary(), "");
+    let lamp = of("lamp");
+    assert!(matches!(lamp.mesh.colors, Colors::PerMaterial { .. }));
+    assert_says(&lamp.report.summary(), &["3 vertex colours left out for materials that do more"]);
 }
 
 #[test]
@@ -30,7 +105,7 @@ fn negative_indices_count_from_where_they_stand() {
 
 #[test]
 fn line_ends_continuations_and_tabs_are_forgiven() {
-    let file = "# C:\\models\\\r\nv\t0 0 0\r\n  v 1 0 0 \r\nv 0 \\\r\n 1 0\r\n\r\nf 1\t2 \\\r\n3";
+    let file = "\u{feff}# C:\\models\\\r\nv\t0 0 0\r\n  v 1 0 0 \r\nv 0 \\\r\n 1 0\r\n\r\nf 1\t2 \\\r\n3";
     let mesh = read("a.obj", file).mesh;
     assert_eq!(mesh.triangles, [[0, 1, 2]]);
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
@@ -70,54 +145,6 @@ fn vertices_without_the_color_that_others_have_are_grey() {
 }
 
 #[test]
-fn materials_color_what_follows_them() {
-    let folder = Folder::new();
-    let materials = "newmtl red one\r\nKd 1 0 0\r\nnewmtl grey\nKd 0.5\nillum 99999\nd\n";
-    folder.put("two words.mtl", materials);
-    let faces = "f 1 2 3\nusemtl\tred one\nf 1 3 4\no x\nf 1 2 4\nusemtl grey\nf 2 3 4\n";
-    let path = folder.put("a.obj", format!("mtllib two words.mtl\n{SQUARE}{faces}"));
-    let loaded = mesh::read(path).unwrap();
-    let colors: Vec<Vec3> = (0..4).map(|i| loaded.mesh.color(i, 0.2, 0.3)).collect();
-    assert_eq!(colors, [Vec3::splat(0.7), Vec3::X, Vec3::X, Vec3::splat(0.5)]);
-    let Colors::PerMaterial { materials, .. } = &loaded.mesh.colors else { panic!() };
-    assert_eq!(materials[0].name, "red one");
-    assert_eq!(loaded.report.summary(), "");
-}
-
-#[test]
-fn material_files_are_found_behind_backslashes_and_in_lists() {
-    let folder = Folder::new();
-    folder.put("sub/a.mtl", "newmtl a\nKd 1 0 0\n");
-    folder.put("b.mtl", "newmtl b\nKd 0 1 0");
-    let libraries = "mtllib sub\\a.mtl\nmtllib none.mtl b.mtl\n";
-    let faces = "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
-    let loaded = mesh::read(folder.put("a.obj", format!("{libraries}{SQUARE}{faces}"))).unwrap();
-    assert_eq!((loaded.mesh.color(0, 0.0, 0.0), loaded.mesh.color(1, 0.0, 0.0)), (Vec3::X, Vec3::Y));
-    assert_eq!(loaded.report.missing_material_files, ["none.mtl"]);
-}
-
-#[test]
-fn missing_and_broken_materials_are_said_and_not_fatal() {
-    let folder = Folder::new();
-    folder.put("bad.mtl", b"newmtl \xe4\nKd 0.1 zwei 0.3\nKd\nnewmtl\nmap_Kd\n");
-    let faces = "usemtl wood\nf 1 2 3\nusemtl wood\nf 1 3 4\n";
-    let file = format!("mtllib gone.mtl\nmtllib bad.mtl\n{SQUARE}{faces}");
-    let loaded = mesh::read(folder.put("a.obj", file)).unwrap();
-    assert_eq!(
-        loaded.report.summary(),
-        "3 MTL lines not understood; material file not found: gone.mtl; material not defined: wood"
-    );
-    assert_eq!(loaded.mesh.color(0, 0.0, 0.0), Vec3::splat(0.7));
-}
-
-#[test]
-#[cfg(unix)]
-fn a_material_file_without_an_end_is_missing() {
-    let loaded = read("a.obj", format!("mtllib /dev/zero\n{SQUARE}f 1 2 3\n"));
-    assert_eq!(loaded.report.missing_material_files, ["/dev/zero"]);
-}
-
-#[test]
 fn foreign_letters_do_no_harm() {
     let file = b"# M\xfcller\no Geh\xe4use\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     assert_eq!(read("a.obj", file).report.triangles, 1);
@@ -134,6 +161,21 @@ fn bad_indices_are_refused_with_their_line() {
     assert_says(&face("1 2 -9223372036854775808"), &["line 6", "out of range"]);
     assert_says(&face("1 2 x\u{1b}[31m"), &["line 6", "no vertex number"]);
     assert_says(&face("/1 /2 /3"), &["line 6", "no vertex number"]);
+    assert_says(
+        &face("1/1 2 3"),
+        &["line 6", "texture coordinate 1", "out of range", "0 texture coordinates"],
+    );
+    assert_says(&face("1/0 2 3"), &["line 6", "texture coordinate 0", "count from 1"]);
+    assert_says(&face("1//-1 2 3"), &["line 6", "normal -1", "out of range", "0 normals"]);
+    assert_says(&face("1//x 2 3"), &["line 6", "normal x", "no normal number"]);
+    assert_says(&face("1/9999999999999999999999 2 3"), &["line 6", "no texture coordinate number"]);
+    assert_says(&face("1///1 2 3"), &["line 6", "more than three"]);
+    let looks = "vt 0 0\nvn 0 0 1\n";
+    assert_says(
+        &refusal("a.obj", format!("{SQUARE}{looks}f 1/2 2 3\n")),
+        &["line 7", "texture coordinate 2"],
+    );
+    assert_says(&refusal("a.obj", format!("{SQUARE}{looks}f 1//-2 2 3\n")), &["line 7", "normal -2"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{Folder, SQUARE_PLY, assert_says, read, refusal};
 use raypack::Vec3;
-use raypack::mesh::{self, Colors, Mesh, ply};
+use raypack::mesh::{self, Attributes, Colors, Mesh, Normal, ply};
 use std::fs;
 
 fn binary(big: bool) -> Vec<u8> {
@@ -160,6 +160,33 @@ fn strips_alternate_and_restart() {
         assert!((b - a).cross(c - a).z > 0.0, "triangle {i} is turned over");
     }
     assert_eq!(strips("uint", "8 0 1 3 2 4294967295 0 1 2\n").mesh, loaded.mesh);
+}
+
+/// A triangle whose vertices have these properties too.
+fn looking(names: &str, values: [&str; 3]) -> String {
+    let properties: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
+    let [a, b, c] = values;
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\n{properties}property float x\nproperty float y\n\
+         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+         {a} 0 0 0\n{b} 1 0 0\n{c} 0 1 0\n3 2 0 1\n"
+    )
+}
+
+#[test]
+fn texture_coordinates_and_normals_come_along() {
+    for names in ["s t", "u v", "texture_u texture_v"] {
+        let mesh = read("a.ply", looking(names, ["0 1", "2 3", "4 5"])).mesh;
+        let uv = [[4.0, 5.0], [0.0, 1.0], [2.0, 3.0]];
+        assert_eq!(mesh.attributes, [Attributes { uv, ..Attributes::NONE }], "{names}");
+    }
+    let mesh = read("a.ply", looking("nz ny nx", ["1 0 0", "0 7 0", "0 0 -1e-30"])).mesh;
+    let normals = [Vec3::NEG_X, Vec3::Z, Vec3::Y].map(Normal::encode);
+    assert_eq!(mesh.attributes, [Attributes { normals, ..Attributes::NONE }]);
+    assert!(read("a.ply", looking("nx ny u", ["1 0 0", "1 0 0", "1 0 0"])).mesh.attributes.is_empty());
+    let loaded = read("a.ply", looking("u v nx ny nz", ["nan 1 0 0 0", "0 inf 1 0 0", "1 1 nan 0 0"]));
+    assert_eq!(loaded.mesh.attributes[0].uv, [[1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]);
+    assert_eq!((loaded.report.bad_texture_coordinates, loaded.report.bad_normals), (2, 2));
 }
 
 #[test]

@@ -1,21 +1,25 @@
 //! The lines of an OBJ file, checked and cleaned, one at a time, as tobj reads them.
 
-use super::mtl::Library;
-use crate::mesh::ReadReport;
+use super::corners::{Corners, VERTICES, resolve};
+use super::library::Library;
+use crate::mesh::{Attributes, Image, Material, ReadReport};
 use crate::mesh::{color, material};
 use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 
 /// A [`BufRead`] that hands out one cleaned line at a time, so that `line` is where tobj is.
 ///
-/// Only vertices, faces and names pass. Of a face's corners only the vertex passes, counted from
-/// the file's start and known to exist.
+/// Only vertices, faces and the ends of groups pass. Of a face's corners only the vertex passes, counted from
+/// the file's start and known to exist. What else triangles have is kept here, in their order.
 pub(super) struct Feed<'a> {
     rest: &'a [u8],
     size: usize,
-    library: &'a Library<'a>,
+    library: Library<'a>,
     all_colored: bool,
     progress: &'a dyn Fn(f32),
+    corners: Corners,
+    /// Where materials change: the first triangle, and its material, if that is known.
+    runs: Vec<(usize, Option<u32>)>,
     /// The cleaned line, and how much of it has been read.
     out: Vec<u8>,
     read: usize,
@@ -36,23 +40,36 @@ pub(super) struct Feed<'a> {
     points: u64,
 }
 
+/// What an OBJ file says of its triangles beside their vertices.
+pub(super) struct Extras {
+    /// How many vertices have a colour of their own.
+    pub colored_vertices: u64,
+    /// The materials of all MTL files.
+    pub materials: Vec<Material>,
+    /// The pictures that they name.
+    pub images: Vec<Image>,
+    /// The first triangle of each part of one material, and that, if it is known.
+    pub runs: Vec<(usize, Option<u32>)>,
+    /// How many triangles the faces make.
+    pub triangles: usize,
+    /// One record a triangle, or none.
+    pub attributes: Vec<Attributes>,
+}
+
 /// How many lines pass between two reports of progress.
 const LINES_PER_REPORT: u64 = 1 << 16;
 
 impl<'a> Feed<'a> {
     /// A feed of `bytes`. With `all_colored`, vertices without a colour get the default one.
-    pub fn new(
-        bytes: &'a [u8],
-        library: &'a Library<'a>,
-        all_colored: bool,
-        progress: &'a dyn Fn(f32),
-    ) -> Self {
+    pub fn new(bytes: &'a [u8], library: Library<'a>, all_colored: bool, progress: &'a dyn Fn(f32)) -> Self {
         Self {
-            rest: bytes,
+            rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
             size: bytes.len(),
             library,
             all_colored,
             progress,
+            corners: Corners::default(),
+            runs: Vec::new(),
             out: Vec::new(),
             read: 0,
             line: 0,
@@ -85,8 +102,8 @@ impl<'a> Feed<'a> {
         }
     }
 
-    /// Adds what was dropped or repaired.
-    pub fn report(self, report: &mut ReadReport) {
+    /// What triangles have beside their vertices; adds what was dropped or repaired to the report.
+    pub fn finish(self, report: &mut ReadReport) -> Extras {
         report.polygons += self.polygons;
         report.short_faces += self.short_faces;
         report.lines += self.lines;
@@ -96,6 +113,15 @@ impl<'a> Feed<'a> {
         report.unused_non_finite += self.non_finite.iter().filter(|(i, _)| !self.used[*i]).count() as u64;
         if self.colored_vertices > 0 {
             report.uncolored_vertices += self.used.len() as u64 - self.colored_vertices;
+        }
+        let (materials, images) = self.library.finish(report);
+        Extras {
+            colored_vertices: self.colored_vertices,
+            materials,
+            images,
+            runs: self.runs,
+            triangles: self.corners.triangles(),
+            attributes: self.corners.finish(report),
         }
     }
 
@@ -141,9 +167,12 @@ impl<'a> Feed<'a> {
                 b"f" => self.face(rest)?,
                 b"l" => self.lines += 1,
                 b"p" => self.points += 1,
-                b"o" | b"g" | b"mtllib" => self.name(keyword, rest),
+                b"vt" => self.corners.coordinates(rest),
+                b"vn" => self.corners.normal(rest),
+                b"o" | b"g" => self.end_group(),
+                b"mtllib" => self.library.load(&String::from_utf8_lossy(rest)),
                 b"usemtl" => self.use_material(rest),
-                // Normals, texture coordinates, comments, smoothing groups, free-form curves.
+                // Comments, smoothing groups, free-form curves.
                 _ => {}
             }
         }
@@ -190,60 +219,45 @@ impl<'a> Feed<'a> {
 
     fn face(&mut self, rest: &[u8]) -> Result<(), String> {
         self.out.push(b'f');
-        let mut corners = 0_u64;
+        self.corners.begin();
+        let mut count = 0_u64;
         for corner in rest.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()) {
-            let vertex = corner.split(|&b| b == b'/').next().unwrap_or_default();
-            let index = self.resolve(vertex)?;
+            let (vertex, others) = match corner.iter().position(|&b| b == b'/') {
+                Some(at) => (&corner[..at], Some(&corner[at + 1..])),
+                None => (corner, None),
+            };
+            let in_line = |message| format!("line {}: {message}", self.line);
+            let index = resolve(vertex, self.used.len(), &VERTICES).map_err(in_line)?;
+            self.corners.corner(others).map_err(in_line)?;
             self.used[index] = true;
             self.out.push(b' ');
             push_decimal(&mut self.out, index + 1);
-            corners += 1;
+            count += 1;
         }
+        self.corners.end();
         self.out.push(b'\n');
-        self.polygons += u64::from(corners > 3);
-        if corners < 3 {
+        self.polygons += u64::from(count > 3);
+        if count < 3 {
             self.short_faces += 1;
             self.out.clear();
         }
         Ok(())
     }
 
-    /// The vertex, counted from 0, that a face's index means: from 1, or from the end if negative.
-    fn resolve(&self, text: &[u8]) -> Result<usize, String> {
-        let count = self.used.len();
-        let number = std::str::from_utf8(text).ok().and_then(|t| t.parse::<i64>().ok());
-        let index = match number {
-            None => return Err(self.bad_index(text, "is no vertex number")),
-            Some(0) => return Err(self.bad_index(text, "does not exist, vertices count from 1")),
-            Some(n) if n > 0 => usize::try_from(n - 1).ok(),
-            Some(n) => usize::try_from(n.unsigned_abs()).ok().and_then(|back| count.checked_sub(back)),
-        };
-        index
-            .filter(|&i| i < count)
-            .ok_or_else(|| self.bad_index(text, &format!("is out of range, {count} vertices come before it")))
-    }
-
-    fn bad_index(&self, text: &[u8], what: &str) -> String {
-        let shown = String::from_utf8_lossy(&text[..text.len().min(24)]).escape_debug().to_string();
-        format!("line {}: vertex {shown} of a face {what}", self.line)
-    }
-
-    /// Passes a line with a name on, with one space before it and in UTF-8.
-    fn name(&mut self, keyword: &[u8], name: &[u8]) {
-        self.out.extend_from_slice(keyword);
-        self.out.push(b' ');
-        self.out.extend_from_slice(String::from_utf8_lossy(name).as_bytes());
-        self.out.push(b'\n');
+    /// Has tobj begin another model, which keeps what it has in work small.
+    fn end_group(&mut self) {
+        self.out.extend_from_slice(b"g\n");
     }
 
     fn use_material(&mut self, name: &[u8]) {
-        // tobj refuses an empty name; here it means what an unknown one means.
-        let name = if name.is_empty() { b"(none)" } else { name };
-        let shown = String::from_utf8_lossy(name).into_owned();
-        if !self.library.defines(&shown) && !self.unknown_materials.contains(&shown) {
-            self.unknown_materials.push(shown);
+        // An empty name means what an unknown one means.
+        let name = if name.is_empty() { "(none)".into() } else { String::from_utf8_lossy(name) };
+        let place = self.library.place(&name);
+        if place.is_none() && !self.unknown_materials.iter().any(|unknown| *unknown == name) {
+            self.unknown_materials.push(name.into_owned());
         }
-        self.name(b"usemtl", name);
+        self.runs.push((self.corners.triangles(), place));
+        self.end_group();
     }
 }
 

@@ -1,26 +1,34 @@
 //! Wavefront OBJ with its MTL files, through `tobj`.
 //!
-//! tobj does the parsing; `feed` stands before it and `mtl` beside it, because tobj alone
-//! misreads or panics on files that are common: an error names no line, vertex colours shift where
-//! only some vertices have them, a tab after a keyword is fatal, so is one Latin-1 letter in a
-//! comment, a MTL line `Kd 0.5` panics, and so can a texture index out of range. Normals and texture
-//! coordinates, which nothing here uses, never reach it; what this saves pays for the checks (the
-//! 148 MB kitchen: 1.6 s, as with tobj alone on the mapped file; 1.8 s through a `BufReader`).
+//! tobj does the parsing of vertices and faces; `feed` stands before it, because tobj alone misreads or panics on
+//! files that are common: an error names no line, vertex colours shift where only some vertices have them, a tab
+//! after a keyword is fatal, so is one Latin-1 letter in a comment, and a texture index out of range can make it
+//! panic. Normals and texture coordinates never reach it, they would make several vertices of one; `corners` keeps
+//! them by triangle, and what this saves pays for the checks. MTL files do not reach it either: a line `Kd 0.5` makes
+//! it panic, and it knows no options before a picture's name. `mtl` reads their lines, and `material` says what they
+//! mean.
 //!
 //! Polygons become fans around their first corner. That is right for convex polygons and for
 //! concave ones that the first corner sees whole; others come out with overlapping triangles, as
 //! in most readers. A triangle's colour is that of its vertices if the file has vertex colours
-//! (`v x y z r g b`), otherwise its material's `Kd`, taken as linear light.
+//! (`v x y z r g b`), otherwise its material's `Kd`, taken as linear light. Of materials with pictures, or through
+//! which light goes, or that mirror or give off light, none is given up for vertex colours: these are left out then,
+//! and counted. Smoothing groups say nothing that normals do not; a file without normals is drawn flat.
 
+mod corners;
 mod feed;
+mod images;
+mod library;
+mod material;
 mod mtl;
+mod texture;
 
 use super::color::{self, Colors};
-use super::material::{self, Material};
+use super::material::{DEFAULT_DIFFUSE, Material};
 use super::{Mesh, ReadReport};
-use feed::Feed;
+use feed::{Extras, Feed};
 use glam::Vec3;
-use mtl::Library;
+use library::Library;
 use std::path::Path;
 
 /// No normals and texture coordinates ever reach tobj, so the position alone is a vertex.
@@ -38,9 +46,9 @@ pub(super) fn parse(
     // Colours on some vertices only would shift tobj's list of them: then every vertex gets one.
     let mut all_colored = false;
     loop {
-        let library = Library::beside(folder);
-        let mut feed = Feed::new(bytes, &library, all_colored, progress);
-        let parsed = tobj::load_obj_buf(&mut feed, &OPTIONS, |file| library.load(file));
+        let mut feed = Feed::new(bytes, Library::beside(folder), all_colored, progress);
+        // No `mtllib` reaches tobj.
+        let parsed = tobj::load_obj_buf(&mut feed, &OPTIONS, |_| Ok(Default::default()));
         if let Some(message) = feed.error.take() {
             return Err(message);
         }
@@ -48,7 +56,7 @@ pub(super) fn parse(
             all_colored = true;
             continue;
         }
-        let (models, materials) = parsed.map_err(|e| format!("line {}: {e}", feed.line))?;
+        let (models, _) = parsed.map_err(|e| format!("line {}: {e}", feed.line))?;
         if feed.vertices() > u64::from(u32::MAX) {
             return Err(format!(
                 "{} vertices, at most {} are possible; split the model",
@@ -57,48 +65,73 @@ pub(super) fn parse(
             ));
         }
         feed.refuse_non_finite()?;
-        let colored = feed.colored_vertices > 0;
-        feed.report(report);
-        library.report(report);
-        return Ok(merge(models, materials.unwrap_or_default(), colored));
+        return merge(models, feed.finish(report), report);
     }
 }
 
-/// All models as one mesh.
-fn merge(models: Vec<tobj::Model>, materials: Vec<tobj::Material>, colored: bool) -> Mesh {
+/// All models as one mesh, with what its triangles have.
+fn merge(models: Vec<tobj::Model>, extras: Extras, report: &mut ReadReport) -> Result<Mesh, String> {
+    let Extras { colored_vertices, mut materials, images, runs, triangles, attributes } = extras;
+    let found: usize = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
+    if found != triangles {
+        return Err(format!(
+            "its faces make {triangles} triangles, but {found} were found; please report this"
+        ));
+    }
     let vertices = models.iter().map(|m| m.mesh.positions.len() / 3).sum();
-    let triangles = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
+    let used = |(_, material): &(usize, Option<u32>)| material.is_some();
+    let by_material = runs.iter().any(used)
+        && (colored_vertices == 0
+            || runs.iter().filter_map(|run| run.1).any(|m| outdoes_colors(&materials[m as usize])));
+    let colored = colored_vertices > 0 && !by_material;
+    report.unused_vertex_colors += if colored { 0 } else { colored_vertices };
     let mut mesh = Mesh {
         positions: Vec::with_capacity(vertices),
         triangles: Vec::with_capacity(triangles),
+        attributes,
         ..Default::default()
     };
-    let has_material = |m: &tobj::Model| m.mesh.material_id.is_some();
-    let by_material = !colored && models.iter().any(has_material);
-    let mut of_triangle = Vec::with_capacity(if by_material { triangles } else { 0 });
     let mut vertex_colors = Vec::with_capacity(if colored { vertices } else { 0 });
-    let no_material = materials.len() as u32;
-    let mut some_without = false;
     for tobj::Model { mesh: model, .. } in models {
         let base = mesh.positions.len() as u32;
         mesh.positions.extend(model.positions.as_chunks().0.iter().map(|&p| Vec3::from_array(p)));
         mesh.triangles.extend(model.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| base + i)));
         if colored {
             vertex_colors.extend_from_slice(model.vertex_color.as_chunks::<3>().0);
-        } else if by_material {
-            let material = model.material_id.map_or(no_material, |m| m as u32);
-            some_without |= material == no_material && !model.indices.is_empty();
-            of_triangle.resize(mesh.triangles.len(), material);
         }
     }
     if colored {
         mesh.colors = Colors::PerVertex(color::quantize(&vertex_colors));
     } else if by_material {
-        let mut materials: Vec<Material> = materials.into_iter().map(mtl::material).collect();
-        if some_without {
-            materials.push(Material::matt("(none)", material::DEFAULT_DIFFUSE));
-        }
+        let of_triangle = of_triangles(&runs, triangles, &mut materials);
         mesh.colors = Colors::PerMaterial { materials, of_triangle };
+        mesh.images = images;
     }
-    mesh
+    Ok(mesh)
+}
+
+/// Whether what a material says beside its colour counts for more than vertices' colours.
+fn outdoes_colors(material: &Material) -> bool {
+    let Material { unlit, reflects, transmission, opacity, emission, maps, .. } = material;
+    *unlit
+        || *reflects
+        || *opacity < 1.0
+        || [transmission, emission].iter().any(|light| **light != Vec3::ZERO)
+        || maps.all().next().is_some()
+}
+
+/// The material of each triangle. One that is nowhere defined is added if any triangle has none.
+fn of_triangles(runs: &[(usize, Option<u32>)], triangles: usize, materials: &mut Vec<Material>) -> Vec<u32> {
+    let none = materials.len() as u32;
+    let mut of_triangle = Vec::with_capacity(triangles);
+    let mut current = none;
+    for &(first, material) in runs {
+        of_triangle.resize(first, current);
+        current = material.unwrap_or(none);
+    }
+    of_triangle.resize(triangles, current);
+    if of_triangle.contains(&none) {
+        materials.push(Material::matt("(none)", DEFAULT_DIFFUSE));
+    }
+    of_triangle
 }

@@ -2,6 +2,7 @@
 
 use super::body::Source;
 use super::header::{Element, Kind, Scalar};
+use super::looks::Looks;
 use crate::mesh::color;
 use crate::mesh::lists::{List, Lists};
 use crate::mesh::material::DEFAULT_DIFFUSE;
@@ -58,6 +59,8 @@ enum Slot {
     Skip,
     Position(usize),
     Color(usize),
+    Coordinate(usize),
+    Normal(usize),
     Indices,
 }
 
@@ -105,6 +108,11 @@ fn slot(name: &str, kind: Kind) -> Slot {
         "red" => Slot::Color(0),
         "green" => Slot::Color(1),
         "blue" => Slot::Color(2),
+        "u" | "s" | "texture_u" => Slot::Coordinate(0),
+        "v" | "t" | "texture_v" => Slot::Coordinate(1),
+        "nx" => Slot::Normal(0),
+        "ny" => Slot::Normal(1),
+        "nz" => Slot::Normal(2),
         _ => Slot::Skip,
     }
 }
@@ -114,6 +122,8 @@ fn slot(name: &str, kind: Kind) -> Slot {
 struct Item {
     position: [f64; 3],
     color: [f64; 3],
+    coordinates: [f64; 2],
+    normal: [f64; 3],
     indices: Vec<f64>,
 }
 
@@ -124,6 +134,10 @@ impl Item {
             match (slot, kind) {
                 (Slot::Position(axis), Kind::Scalar(kind)) => self.position[axis] = source.number(kind)?,
                 (Slot::Color(channel), Kind::Scalar(kind)) => self.color[channel] = source.number(kind)?,
+                (Slot::Coordinate(axis), Kind::Scalar(kind)) => {
+                    self.coordinates[axis] = source.number(kind)?
+                }
+                (Slot::Normal(axis), Kind::Scalar(kind)) => self.normal[axis] = source.number(kind)?,
                 (Slot::Indices, Kind::List { count, item }) => {
                     let length = source.length(count, item)?;
                     self.indices.clear();
@@ -170,6 +184,7 @@ fn no_list(error: std::io::Error) -> ItemError {
 pub(super) struct Vertices<L: Lists> {
     pub positions: L::Of<Vec3>,
     pub shades: Shades<L>,
+    pub looks: Looks,
 }
 
 impl<L: Lists> Vertices<L> {
@@ -189,6 +204,9 @@ impl<L: Lists> Vertices<L> {
         if let Some(kind) = layout.color {
             self.shades.begin(lists, kind, 0)?;
         }
+        let has_all = |slots: &[Slot]| L::ATTRIBUTES && slots.iter().all(|&slot| layout.has(slot));
+        let with_coordinates = has_all(&[Slot::Coordinate(0), Slot::Coordinate(1)]);
+        let with_normals = has_all(&[Slot::Normal(0), Slot::Normal(1), Slot::Normal(2)]);
         let mut item = Item::default();
         for index in 0..element.count {
             row(index, source);
@@ -196,6 +214,12 @@ impl<L: Lists> Vertices<L> {
             self.positions.push(Vec3::from_array(item.position.map(|x| x as f32)));
             if let Some(kind) = layout.color {
                 self.shades.push(kind, item.color, 1);
+            }
+            if with_coordinates {
+                self.looks.push_coordinates(item.coordinates);
+            }
+            if with_normals {
+                self.looks.push_normal(item.normal);
             }
         }
         Ok(())

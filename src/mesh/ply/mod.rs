@@ -8,12 +8,14 @@
 //! What is understood: elements `vertex`, `face` and `tristrips`, in any order; `x y z` of any
 //! numeric type; index lists named `vertex_indices` or `vertex_index` of any integer type; colours
 //! `red green blue` or `diffuse_red …` on vertices, faces or strips. A colour per face goes before
-//! one per vertex. Everything else is skipped. Faces of more than three corners become fans around
+//! one per vertex. Texture coordinates `u v`, `s t` or `texture_u texture_v` and normals `nx ny nz` of vertices come
+//! along where the mesh is in memory. Everything else is skipped. Faces of more than three corners become fans around
 //! their first corner (right for convex ones); every second triangle of a strip is turned round.
 
 mod body;
 mod elements;
 mod header;
+mod looks;
 mod parts;
 mod write;
 
@@ -28,6 +30,7 @@ pub(super) use elements::Shades;
 use elements::{Faces, Vertices};
 use glam::Vec3;
 use header::{Element, Encoding, Header};
+use looks::Looks;
 use std::path::Path;
 
 /// How many items pass between two reports of progress.
@@ -46,7 +49,8 @@ pub(super) fn parse(
         (None, Some(of_vertices)) => Colors::PerVertex(of_vertices),
         (None, None) => Colors::default(),
     };
-    Ok(Mesh { positions: raw.positions, triangles: raw.triangles, colors, ..Mesh::default() })
+    let attributes = raw.looks.of_triangles(&raw.triangles, report);
+    Ok(Mesh { positions: raw.positions, triangles: raw.triangles, colors, attributes, ..Mesh::default() })
 }
 
 /// What a PLY file holds, as it stands there.
@@ -55,6 +59,7 @@ pub(super) struct Raw<L: Lists> {
     pub triangles: L::Of<[u32; 3]>,
     pub of_faces: Shades<L>,
     pub of_vertices: Shades<L>,
+    pub looks: Looks,
 }
 
 /// The numbers of vertices and faces that a PLY file's header announces; `None` if it is no PLY file.
@@ -90,8 +95,11 @@ fn read_body<L: Lists, S: Source>(
     let size = source.remaining().max(1) as f32;
     let vertex_count = header.vertex_count()?;
     let no_list = |error| format!("there is no room for what it holds: {error}");
-    let mut vertices =
-        Vertices { positions: lists.list::<Vec3>().map_err(no_list)?, shades: Shades::<L>::None };
+    let mut vertices = Vertices {
+        positions: lists.list::<Vec3>().map_err(no_list)?,
+        shades: Shades::<L>::None,
+        looks: Looks::default(),
+    };
     let mut faces = Faces::<L>::new(vertex_count, lists.list().map_err(no_list)?);
     for element in &header.elements {
         check_room(element, &source)?;
@@ -119,6 +127,7 @@ fn read_body<L: Lists, S: Source>(
         triangles: faces.triangles,
         of_faces: faces.shades,
         of_vertices: vertices.shades,
+        looks: vertices.looks,
     })
 }
 
