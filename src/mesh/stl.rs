@@ -262,9 +262,11 @@ mod tests {
     #[test]
     fn text_in_any_case_and_any_language() {
         assert_square(read(ascii_file(&SQUARE).to_uppercase()));
-        assert_square(read(
-            ascii_file(&SQUARE).replace('\n', "\r\n\r\n").replacen("solid a square", "\tsolid", 1),
-        ));
+        assert_square(read(ascii_file(&SQUARE).replace('\n', "\r\n\r\n").replacen(
+            "solid a square",
+            "\tsolid",
+            1,
+        )));
         let latin = [b"solid Geh\xe4use \xff\n", &ascii_file(&SQUARE).as_bytes()[15..]].concat();
         assert_square(read(latin));
     }
