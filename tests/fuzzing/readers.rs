@@ -32,6 +32,16 @@ pub fn ply(bytes: &[u8]) {
     check(mesh::parse(bytes, "model.ply"));
 }
 
+/// An STL file.
+pub fn stl(bytes: &[u8]) {
+    check(mesh::parse(bytes, "model.stl"));
+}
+
+/// A glTF file, as JSON or GLB; files that it names are not there.
+pub fn gltf(bytes: &[u8]) {
+    check(mesh::parse(bytes, "no such folder/model.gltf"));
+}
+
 /// A `.npy` file of rays, of known length and from a pipe.
 pub fn npy(bytes: &[u8]) {
     let path = Path::new("rays.npy");
@@ -73,10 +83,14 @@ fn check(loaded: Result<Loaded, Error>) {
             assert_eq!(of_triangle.len(), triangles);
             assert!(of_triangle.iter().all(|&material| (material as usize) < materials.len()));
             for material in materials {
-                assert!(material.diffuse.to_array().iter().all(|c| (0.0..=1.0).contains(c)), "{material:?}");
+                assert_eq!(material.fault(), None, "{material:?}");
+                assert!(material.maps.all().all(|map| (map.image as usize) < mesh.images.len()));
             }
         }
     }
+    let attributes = &mesh.attributes;
+    assert!(attributes.is_empty() || attributes.len() == triangles);
+    assert!(attributes.iter().all(|corners| corners.uv.as_flattened().iter().all(|x| x.is_finite())));
     let last = triangles as u32 - 1;
     assert!(mesh.color(0, 0.25, 0.25).is_finite() && mesh.color(last, 0.25, 0.25).is_finite());
     assert!(!report.summary().contains('\n'), "{:?}", report.summary());

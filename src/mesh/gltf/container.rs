@@ -87,12 +87,11 @@ fn check_version(json: &[u8]) -> Result<(), String> {
         min_version: Option<String>,
     }
     let Head { asset } = serde_json::from_slice(json).map_err(|e| format!("no glTF: {e}"))?;
-    let needed = asset.min_version.unwrap_or(asset.version);
-    match needed.as_str() {
-        "2" | "2.0" => Ok(()),
-        // Minor versions add what readers may leave out, unless the file says that it needs them.
-        newer if newer.starts_with("2.") => Ok(()),
-        other => Err(format!("glTF version {other:?}, only 2.0 is understood; convert it")),
+    // What minor versions add can be left out, unless the file says that it needs them.
+    let needed = asset.min_version.filter(|needed| needed != "2.0");
+    match needed.or((asset.version.split('.').next() != Some("2")).then_some(asset.version)) {
+        None => Ok(()),
+        Some(other) => Err(format!("glTF version {other:?}, only 2.0 is understood; convert it")),
     }
 }
 

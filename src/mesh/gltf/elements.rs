@@ -8,6 +8,7 @@ use super::buffers::Buffers;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::accessor::sparse::Sparse;
 use gltf::{Accessor, Document};
+use std::cmp::Ordering;
 
 /// An accessor's elements, all of which lie in their buffers.
 #[derive(Clone, Debug)]
@@ -20,8 +21,43 @@ pub(super) struct Elements<'a> {
     size: usize,
     /// Where they are, and bytes from one to the next; without, they are zeros.
     base: Option<(&'a [u8], usize)>,
-    /// The numbers of those that are others, in order, and their bytes without gaps.
-    changed: Option<(Vec<u32>, &'a [u8])>,
+    /// Those that are others.
+    changed: Option<Changed<'a>>,
+}
+
+/// Elements that a sparse accessor changes.
+#[derive(Clone, Copy, Debug)]
+struct Changed<'a> {
+    /// Which ones, rising, in little-endian numbers of `step` bytes. They stay bytes: many primitives may name the
+    /// same accessor.
+    numbers: &'a [u8],
+    step: usize,
+    /// What they are, without gaps.
+    values: &'a [u8],
+}
+
+impl Changed<'_> {
+    fn count(&self) -> usize {
+        self.numbers.len() / self.step
+    }
+
+    fn number(&self, at: usize) -> u32 {
+        unsigned(&self.numbers[at * self.step..][..self.step])
+    }
+
+    /// Where an element is among those that are changed.
+    fn find(&self, index: u32) -> Option<usize> {
+        let (mut low, mut high) = (0, self.count());
+        while low < high {
+            let middle = low.midpoint(high);
+            match self.number(middle).cmp(&index) {
+                Ordering::Equal => return Some(middle),
+                Ordering::Less => low = middle + 1,
+                Ordering::Greater => high = middle,
+            }
+        }
+        None
+    }
 }
 
 impl<'a> Elements<'a> {
@@ -74,10 +110,10 @@ impl<'a> Elements<'a> {
     #[inline]
     fn bytes(&self, index: u32) -> Option<&'a [u8]> {
         assert!((index as usize) < self.count, "an element out of range");
-        if let Some((numbers, values)) = &self.changed
-            && let Ok(at) = numbers.binary_search(&index)
+        if let Some(changed) = &self.changed
+            && let Some(at) = changed.find(index)
         {
-            return Some(&values[at * self.size..][..self.size]);
+            return Some(&changed.values[at * self.size..][..self.size]);
         }
         self.base.map(|(bytes, stride)| &bytes[index as usize * stride..][..self.size])
     }
@@ -111,7 +147,7 @@ fn changed<'a>(
     buffers: &'a Buffers<'_>,
     count: usize,
     size: usize,
-) -> Result<(Vec<u32>, &'a [u8]), String> {
+) -> Result<Changed<'a>, String> {
     let changes = usize::try_from(sparse.count.0).map_err(|e| e.to_string())?;
     let short = || format!("{changes} sparse elements are more than their views hold");
     let step = match sparse.indices.component_type {
@@ -120,13 +156,14 @@ fn changed<'a>(
     };
     let numbers = buffers.view(sparse.indices.buffer_view.value())?;
     let numbers = range(numbers, sparse.indices.byte_offset.0, changes, step, step).ok_or_else(short)?;
-    let numbers: Vec<u32> = numbers.chunks_exact(step).map(unsigned).collect();
     let values = buffers.view(sparse.values.buffer_view.value())?;
     let values = range(values, sparse.values.byte_offset.0, changes, size, size).ok_or_else(short)?;
-    if !numbers.is_sorted_by(|a, b| a < b) || numbers.last().is_some_and(|&last| last as usize >= count) {
+    let changed = Changed { numbers, step, values };
+    let in_range = changes == 0 || (changed.number(changes - 1) as usize) < count;
+    if !in_range || !(0..changes).is_sorted_by(|&a, &b| changed.number(a) < changed.number(b)) {
         return Err("sparse indices that do not rise, or are out of range".into());
     }
-    Ok((numbers, values))
+    Ok(changed)
 }
 
 /// One, two or four little-endian bytes as a number.

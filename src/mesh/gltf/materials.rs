@@ -59,9 +59,11 @@ pub(super) fn read(
         material.unlit = true;
         material.specular = Vec3::ZERO;
         material.reflects = false;
+        (material.maps.specular, material.maps.roughness) = (None, None);
+    } else {
+        reader.normal(&mut material);
     }
     reader.emission(&mut material);
-    reader.normal(&mut material);
     let set = reader.sets.first().copied().unwrap_or(0);
     let same = reader.sets.iter().all(|&other| other == set);
     if !same {
@@ -69,7 +71,7 @@ pub(super) fn read(
     }
     match material.fault() {
         None => Ok(Surface { material, set: if same { set } else { 0 } }),
-        Some(fault) => Err(format!("material {number}: its {fault} cannot be; repair the material")),
+        Some(fault) => Err(format!("material {number}: its {fault} is no number or out of range; repair it")),
     }
 }
 

@@ -25,7 +25,7 @@ use super::{Mesh, ReadReport};
 use buffers::Buffers;
 use primitives::Part;
 use scene::Builder;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use textures::Textures;
 
@@ -46,9 +46,10 @@ pub(super) fn parse(
     let images = textures.images;
 
     let instances = nodes::instances(&document)?;
+    let shown: HashSet<usize> = instances.iter().map(|instance| instance.mesh).collect();
     let mut parts: HashMap<usize, Vec<Part<'_>>> = HashMap::new();
     for (number, mesh) in document.meshes().enumerate() {
-        if instances.iter().any(|instance| instance.mesh == number) {
+        if shown.contains(&number) {
             let set = |material: usize| surfaces[material].set;
             let read = mesh.primitives().map(|p| Part::read(&p, &document, &buffers, set, report));
             let read = read.filter_map(Result::transpose).collect::<Result<_, _>>();

@@ -9,6 +9,7 @@ use gltf::texture::{Info, Texture, WrappingMode};
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A picture that a material names.
 pub(super) struct Picture<'a> {
@@ -73,12 +74,24 @@ pub(super) struct Textures<'a> {
     pub images: Vec<Image>,
     /// By the image's number in the document, its place in `images`.
     places: HashMap<Option<usize>, u32>,
+    /// By the number of a buffer view, the copy of its bytes.
+    copies: HashMap<usize, Arc<[u8]>>,
+    /// Bytes that may still be copied out of buffers.
+    left: u64,
 }
 
 impl<'a> Textures<'a> {
     /// None yet, of a model in `folder`.
     pub fn new(document: &'a Document, buffers: &'a Buffers<'a>, folder: &'a Path) -> Self {
-        Self { document, buffers, folder, images: Vec::new(), places: HashMap::new() }
+        Self {
+            document,
+            buffers,
+            folder,
+            images: Vec::new(),
+            places: HashMap::new(),
+            copies: HashMap::new(),
+            left: buffers.size(),
+        }
     }
 
     /// A picture as a map.
@@ -119,7 +132,7 @@ impl<'a> Textures<'a> {
     }
 
     /// An image of the document; `None` is one that only unknown extensions know of.
-    fn image(&self, number: Option<usize>) -> Image {
+    fn image(&mut self, number: Option<usize>) -> Image {
         let Some(number) = number else {
             let why = "in a form that is not read; store them as PNG or JPEG";
             return Image { name: "of textures".into(), source: ImageSource::Missing(why.into()) };
@@ -137,12 +150,23 @@ impl<'a> Textures<'a> {
                 };
                 (name, source)
             }
-            (None, Some(view)) => {
-                let bytes = self.buffers.view(view.value());
-                (named(), bytes.map_or_else(missing, |bytes| ImageSource::Bytes(bytes.into())))
-            }
+            (None, Some(view)) => (named(), self.copy(view.value()).map_or_else(missing, ImageSource::Bytes)),
             (None, None) => (named(), missing("has no data".into())),
         };
         Image { name, source }
+    }
+
+    /// A view's bytes.
+    fn copy(&mut self, view: usize) -> Result<Arc<[u8]>, String> {
+        if let Some(copy) = self.copies.get(&view) {
+            return Ok(copy.clone());
+        }
+        let bytes = self.buffers.view(view)?;
+        // A short file could name the same long piece of a buffer in views without end.
+        let left = self.left.checked_sub(bytes.len() as u64);
+        self.left = left.ok_or("overlaps others in its buffer")?;
+        let copy: Arc<[u8]> = bytes.into();
+        self.copies.insert(view, copy.clone());
+        Ok(copy)
     }
 }
