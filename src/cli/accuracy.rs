@@ -35,7 +35,7 @@ const REFERENCE_FACTOR: u32 = 16;
 /// too, and no failure: the exit code is 0, and the report says so and names the quickest ("fits" in JSON).
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply, or the one in a .rpk scene file
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or the one in a .rpk scene file
     model: PathBuf,
     /// The camera, as eye=x,y,z;at=x,y,z;up=x,y,z;fov=DEG or a TOML file; without it the model is framed
     #[arg(long, allow_hyphen_values = true)]

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 /// Embree to an instruction set.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply, or the one in a .rpk scene file
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or the one in a .rpk scene file
     model: PathBuf,
     /// Measure builds: time, memory and the quality of the trees, every preset beside Embree low, medium and
     /// high and obvhs, reading the file apart; rays are then traced in each with all threads

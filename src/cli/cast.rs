@@ -46,7 +46,7 @@ use std::time::Instant;
 #[derive(Clone, Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// The model: .obj or .ply, or a .rpk scene file
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or a .rpk scene file
     scene: PathBuf,
     /// The rays: a .npy file of N x 8 float32
     #[arg(long, value_name = "FILE")]

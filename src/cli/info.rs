@@ -23,7 +23,7 @@ use surfaces::ColorReport;
 /// Say what is in a model or a scene file, and what its tree is like
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply, or a .rpk scene file
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or a .rpk scene file
     model: PathBuf,
     /// Check every checksum of a scene file
     #[arg(long)]

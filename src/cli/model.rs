@@ -96,7 +96,7 @@ impl Model {
 fn or_scene(error: Error) -> Error {
     match error {
         Error::UnknownFormat { path, .. } => {
-            let expected = "a model is a .obj or a .ply file, or a .rpk scene file";
+            let expected = "a model is a .obj, .ply, .stl, .gltf or .glb file, or a .rpk scene file";
             Error::UnknownFormat { path, expected }
         }
         other => other,

@@ -40,7 +40,7 @@ const DEMO_SIZE: Size = Size { width: 1280, height: 720 };
 /// RAYPACK_ISA=portable|avx2|avx512 forces an instruction set.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply, or a .rpk scene file; without it, the built-in process plant
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or a .rpk scene file; without it, the built-in process plant
     scene: Option<PathBuf>,
     #[command(flatten)]
     outputs: Outputs,

@@ -25,7 +25,7 @@ const LEAST_MINUTES: f64 = 0.05;
 /// setting is worth around the best. Interrupt it (Ctrl-C) to have the best so far written.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The model: .obj or .ply, or the one in a .rpk scene file
+    /// The model: .obj, .ply, .stl, .gltf or .glb, or the one in a .rpk scene file
     model: PathBuf,
     /// The profile to write: a .toml file
     #[arg(short, long, value_name = "FILE")]

@@ -1,12 +1,13 @@
 //! Triangle meshes: what readers and generators make and the tree builder takes.
 //!
-//! [`read()`] turns an OBJ or PLY file into a checked [`Mesh`] and says what it dropped or
+//! [`read()`] turns an OBJ, PLY, STL or glTF file into a checked [`Mesh`] and says what it dropped or
 //! repaired; [`generate`] makes models of any size; [`ply::write`] saves one.
 
 mod attributes;
 mod check;
 mod color;
 pub mod generate;
+mod gltf;
 mod image;
 mod join;
 mod lists;
@@ -16,6 +17,7 @@ pub mod ply;
 mod read;
 mod shape;
 pub mod spooled;
+mod stl;
 
 pub use attributes::{Attributes, Normal};
 pub use check::MAX_TRIANGLES;

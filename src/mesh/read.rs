@@ -1,7 +1,7 @@
 //! Reading a model file, whatever its format, and saying what was found wrong with it.
 
 use super::check::{self, MAX_TRIANGLES, Unusable};
-use super::{Mesh, obj, ply};
+use super::{Mesh, gltf, obj, ply, stl};
 use crate::error::{Error, Result};
 use memmap2::Mmap;
 use serde::Serialize;
@@ -63,6 +63,9 @@ pub struct ReadReport {
     pub outside_textures: Vec<String>,
     /// Bytes after the last element that the header announces.
     pub trailing_bytes: u64,
+
+    /// What of a glTF file is not shown as it says, a clause each, none twice.
+    pub notes: Vec<String>,
 }
 
 impl ReadReport {
@@ -106,7 +109,18 @@ impl ReadReport {
             }
             parts.push(part);
         }
+
+        parts.extend(self.notes.iter().cloned());
         parts.join("; ")
+    }
+
+    /// Adds to [`notes`](Self::notes) what is not there yet. What a file's own words bring in stays on one line.
+    pub(super) fn note(&mut self, note: String) {
+        let shown = |c: char| if c.is_control() { c.escape_default().collect() } else { String::from(c) };
+        let note: String = note.chars().map(shown).collect();
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
     }
 }
 
@@ -119,7 +133,8 @@ fn plural(noun: &str, count: u64) -> String {
     }
 }
 
-/// Reads a model. The file's ending decides how: `.obj` (with its MTL files) or `.ply`.
+/// Reads a model. The file's ending decides how: `.obj` (with its MTL files), `.ply`, `.stl`, `.gltf` or `.glb`
+/// (with the buffers that they name).
 ///
 /// # Errors
 ///
@@ -158,8 +173,10 @@ fn parser(path: &Path) -> Result<Parser> {
     match ending.as_deref() {
         Some("obj") => Ok(obj::parse),
         Some("ply") => Ok(ply::parse),
+        Some("stl") => Ok(stl::parse),
+        Some("gltf" | "glb") => Ok(gltf::parse),
         _ => {
-            let expected = "a model is a .obj or a .ply file";
+            let expected = "a model is a .obj, .ply, .stl, .gltf or .glb file";
             Err(Error::UnknownFormat { path: path.into(), expected })
         }
     }

@@ -88,6 +88,13 @@ const TOKENS: &[&str] = &[
     "(",
     "{",
     "}",
+    "solid\n",
+    "endloop\n",
+    "vertex 0 0 0\n",
+    "\"count\":4294967295,",
+    "\"byteOffset\":1,",
+    "\"children\":[0],",
+    "\"sparse\":{",
 ];
 
 proptest! {
@@ -104,6 +111,16 @@ proptest! {
     #[test]
     fn ply(bytes in mutant("ply")) {
         readers::ply(&bytes);
+    }
+
+    #[test]
+    fn stl(bytes in mutant("stl")) {
+        readers::stl(&bytes);
+    }
+
+    #[test]
+    fn gltf(bytes in mutant("gltf")) {
+        readers::gltf(&bytes);
     }
 
     #[test]
@@ -128,6 +145,8 @@ fn seeds_are_sound() {
         ("obj", readers::obj as fn(&[u8])),
         ("mtl", readers::mtl),
         ("ply", readers::ply),
+        ("stl", readers::stl),
+        ("gltf", readers::gltf),
         ("npy", readers::npy),
         ("trace", trace::build_and_trace),
     ] {

@@ -32,6 +32,16 @@ pub fn ply(bytes: &[u8]) {
     check(mesh::parse(bytes, "model.ply"));
 }
 
+/// An STL file.
+pub fn stl(bytes: &[u8]) {
+    check(mesh::parse(bytes, "model.stl"));
+}
+
+/// A glTF file, as JSON or GLB; files that it names are not there.
+pub fn gltf(bytes: &[u8]) {
+    check(mesh::parse(bytes, "no such folder/model.gltf"));
+}
+
 /// A `.npy` file of rays, of known length and from a pipe.
 pub fn npy(bytes: &[u8]) {
     let path = Path::new("rays.npy");

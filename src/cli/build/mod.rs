@@ -27,7 +27,7 @@ use std::time::Instant;
 /// scene, in more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
-    /// The models: .obj or .ply, or .rpk scene files, whose trees are built anew
+    /// The models: .obj, .ply, .stl, .gltf or .glb, or .rpk scene files, whose trees are built anew
     #[arg(required = true, value_name = "MODEL")]
     models: Vec<PathBuf>,
     /// The scene file: .rpk
