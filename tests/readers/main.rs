@@ -1,5 +1,6 @@
-//! OBJ and PLY as scanners and CAD programs write them, and as they break.
+//! OBJ and PLY as scanners and CAD programs write them, and as they break; that the others are found by their ending.
 
+mod endings;
 mod obj;
 mod ply;
 
