@@ -25,7 +25,7 @@ pub enum Error {
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// What would be understood, as a sentence: "a model is .obj or .ply".
+        /// What would be understood, as a sentence: "a model is a .obj or .ply file".
         expected: &'static str,
     },
     /// A file was read but does not hold what its format demands.

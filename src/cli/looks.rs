@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::render::{Limits, Staged, Wishes};
 use crate::scene::effects::{Call, Effect, Request};
 use crate::scene::{Camera, Environment, Lighting, Surface};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tracing::{info, warn};
 
 /// `--effects`, `--environment`, `--bounces` and `--error`.
@@ -48,11 +48,6 @@ impl LooksOptions {
             }
             _ => Ok(request),
         }
-    }
-
-    /// The file with the environment.
-    pub fn environment(&self) -> Option<&Path> {
-        self.environment.as_deref()
     }
 
     /// Finds out what a scene calls for and opens what is needed for it.

@@ -73,6 +73,8 @@ mod tests {
             tile_p99: 0.0,
             threads: 1,
             pinned: 0,
+            samples: 1.0,
+            costs: crate::render::EffectCosts::default(),
         };
         let row = |&(accuracy, samples, ms, rmse): &(Accuracy, u32, f64, f64)| {
             let times = Times::of(vec![ms * 1e-3]);
