@@ -28,7 +28,7 @@ pub(super) fn open(image: &Image, uses: Uses) -> Result<Picture, Problem> {
     };
     match decoded {
         Ok(picture) => Ok(Picture::new(picture, uses)),
-        Err(message) => Err(Problem { image: image.name.clone(), message: one_line(&message) }),
+        Err(message) => Err(Problem { image: one_line(&image.name), message: one_line(&message) }),
     }
 }
 
