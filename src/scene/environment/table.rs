@@ -102,7 +102,7 @@ fn accumulate(weights: &mut [f64]) -> f64 {
 fn choose(chances: &[f64], random: f32) -> (usize, f64) {
     const BELOW_ONE: f64 = 1.0 - f64::EPSILON;
     // A NaN is 0.
-    let random = f64::from(random).max(0.0).min(BELOW_ONE);
+    let random = if random >= 0.0 { f64::from(random).min(BELOW_ONE) } else { 0.0 };
     let i = chances.partition_point(|&chance| chance <= random);
     let before = if i == 0 { 0.0 } else { chances[i - 1] };
     (i, (random - before) / (chances[i] - before))

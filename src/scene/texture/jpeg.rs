@@ -1,30 +1,31 @@
 //! Whether a JPEG file is all there: its decoder fills up with grey what is missing, and says nothing.
 
-use std::io::{self, BufRead, Read as _};
+use std::io::{self, BufRead, ErrorKind, Read as _};
 
-/// Whether the picture's end is marked. Reads on to there, from segment to segment: what is inside of them, such
-/// as a small picture of the picture, may have an end of its own (ITU-T T.81, annex B).
+/// Whether the picture's end is marked.
 pub(super) fn is_whole(input: &mut impl BufRead) -> io::Result<bool> {
-    let mut passed = Vec::new();
+    match find_end(input) {
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
+        found => found.map(|()| true),
+    }
+}
+
+/// Reads on to there, from segment to segment: what is inside of them, such as a small picture of the picture, may
+/// have an end of its own (ITU-T T.81, annex B).
+fn find_end(input: &mut impl BufRead) -> io::Result<()> {
     loop {
-        passed.clear();
-        input.read_until(0xff, &mut passed)?;
+        input.skip_until(0xff)?;
         let mut marker = [0xff];
         while marker == [0xff] {
-            if input.read(&mut marker)? == 0 {
-                return Ok(false);
-            }
+            input.read_exact(&mut marker)?;
         }
         match marker[0] {
-            0xd9 => return Ok(true),
+            0xd9 => return Ok(()),
             // A byte of the picture itself, or a marker that stands alone.
             0x00 | 0x01 | 0xd0..=0xd8 => {}
             _ => {
                 let mut length = [0; 2];
-                match input.read_exact(&mut length) {
-                    Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
-                    read => read?,
-                }
+                input.read_exact(&mut length)?;
                 let rest = u64::from(u16::from_be_bytes(length)).saturating_sub(2);
                 io::copy(&mut input.take(rest), &mut io::sink())?;
             }

@@ -67,6 +67,9 @@ macro_rules! with {
 impl Textures {
     /// Opens the pictures that `maps` name, in parallel, and no others; `maps` are those that will be sampled (of
     /// others the filtering is coarser, not wrong). The problems are in the order of the images.
+    ///
+    /// A picture may have 32768 texels a side and take up 1 GiB; one that is larger is a problem, as is one that
+    /// is broken or ends too early.
     pub fn open<'a>(images: &[Image], maps: impl IntoIterator<Item = &'a Map>) -> (Self, Vec<Problem>) {
         let mut uses = vec![Uses::default(); images.len()];
         for map in maps {

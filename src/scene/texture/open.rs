@@ -22,7 +22,7 @@ pub(super) fn open(image: &Image, uses: Uses) -> Result<Picture, Problem> {
     let decoded = image.source.read().and_then(|bytes| decode(Cursor::new(&bytes[..]), name_of(image)));
     match decoded {
         Ok(picture) => Ok(Picture::new(picture, uses)),
-        Err(message) => Err(Problem { image: image.name.clone(), message: one_line(&message) }),
+        Err(message) => Err(Problem { image: one_line(&image.name), message: one_line(&message) }),
     }
 }
 

@@ -52,7 +52,7 @@ impl<T: Texel> Pyramid<T> {
             pyramid.color = pyramid.reductions(true, uses.alpha);
         }
         if uses.data || !wants_color {
-            pyramid.data = pyramid.reductions(false, uses.color && uses.alpha);
+            pyramid.data = pyramid.reductions(false, T::LINEAR && uses.color && uses.alpha);
         }
         pyramid
     }
@@ -213,6 +213,9 @@ mod tests {
         let uses = Uses { alpha: true, ..COLOR };
         let pyramid = Pyramid::new(4, level(2, &texels, 4), uses);
         assert_eq!(pyramid.levels(true)[0].texels, [255, 0, 0, 64]);
+        // Numbers are not colours: they count alike.
+        let pyramid = Pyramid::new(4, level(2, &texels, 4), Uses { data: true, ..uses });
+        assert_eq!(pyramid.levels(false)[0].texels, [64, 191, 0, 64]);
         // Where alpha means nothing to anyone, it does not count.
         let pyramid = Pyramid::new(4, level(2, &texels, 4), COLOR);
         assert_eq!(pyramid.levels(true)[0].texels, [137, 225, 0, 64]);
