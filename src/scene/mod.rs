@@ -1,7 +1,8 @@
 //! What is looked at, from where, in what light.
 //!
 //! [`Camera`] says where the eye is; [`View`] makes its rays for one image size; [`Orbit`] moves
-//! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on.
+//! it; [`Lighting`] is the light that falls on the scene; [`Surface`] is what it falls on,
+//! and [`Emitters`] are those of its triangles that shine.
 
 mod camera;
 mod emitters;
