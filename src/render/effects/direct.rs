@@ -61,7 +61,11 @@ impl Direct<'_> {
         }
         if let Some(emitters) = &self.lights.emitters {
             let light =
-                emitters.sample(path.random(sequence, Use::Light), path.random(sequence, Use::LightPlace));
+                emitters.sample_for(
+                origin,
+                path.random(sequence, Use::Light),
+                path.random(sequence, Use::LightPlace),
+            );
             let way = light.position - origin;
             let distance = way.length();
             let toward = way / distance;

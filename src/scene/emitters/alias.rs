@@ -58,16 +58,22 @@ impl AliasTable {
 }
 
 /// In which of `count` slots a pair of numbers falls, and how far along in it, 0 to 1.
-///
-/// One number has 24 digits: with a hundred thousand slots seven are left for the place in the slot, and beyond 2^24
-/// there are slots that it does not reach. The second number has the next 24.
 #[inline]
-fn place([coarse, fine]: [f32; 2], count: usize) -> (usize, f64) {
-    const STEP: f64 = 1.0 / (1 << 24) as f64;
-    let place = (f64::from(coarse) + f64::from(fine) * STEP) * count as f64;
+fn place(pair: [f32; 2], count: usize) -> (usize, f64) {
+    let place = joined(pair) * count as f64;
     // Rounding may lead to the end itself.
     let slot = (place as usize).min(count - 1);
     (slot, place - slot as f64)
+}
+
+/// The number in [0, 1) of which a pair of numbers in [0, 1) has the first 24 binary digits and the next 24.
+///
+/// One number is not enough: with a hundred thousand slots seven digits are left for the place in the slot, and beyond
+/// 2^24 there are slots that it does not reach.
+#[inline]
+pub(super) fn joined([coarse, fine]: [f32; 2]) -> f64 {
+    const STEP: f64 = 1.0 / (1 << 24) as f64;
+    f64::from(coarse) + f64::from(fine) * STEP
 }
 
 #[cfg(test)]

@@ -12,26 +12,36 @@ fn square(first: u32, center: Vec3, side: f32, radiance: [Vec3; 2]) -> [(u32, [V
 
 /// The mean of `f` over `count` samples.
 fn mean(emitters: &Emitters, count: u32, f: impl Fn(&EmitterSample) -> f64) -> f64 {
+    mean_of(count, |pick, uv| f(&emitters.sample(pick, uv)))
+}
+
+/// The mean over `count` pairs of pairs of numbers.
+fn mean_of(count: u32, mut f: impl FnMut([f32; 2], [f32; 2]) -> f64) -> f64 {
     // An additive recurrence in four dimensions.
     let fraction = |i: u32, step: f64| (f64::from(i) * step).fract() as f32 * 0.999_999_9;
-    let sum: f64 = (0..count)
-        .map(|i| {
-            let pick = [fraction(i, 0.856_674_883_854_502_9), fraction(i, 0.733_891_856_627_126)];
-            let uv = [fraction(i, 0.628_706_721_307_471_9), fraction(i, 0.538_597_257_252_359_5)];
-            f(&emitters.sample(pick, uv))
-        })
-        .sum();
-    sum / f64::from(count)
+    let of = |i: u32| {
+        let pick = [fraction(i, 0.856_674_883_854_502_9), fraction(i, 0.733_891_856_627_126)];
+        f(pick, [fraction(i, 0.628_706_721_307_471_9), fraction(i, 0.538_597_257_252_359_5)])
+    };
+    (0..count).map(of).sum::<f64>() / f64::from(count)
 }
 
 /// The green light on a surface at the origin that faces +Y.
 fn irradiance(emitters: &Emitters, count: u32) -> f64 {
-    mean(emitters, count, |s| {
-        let way = s.position.as_dvec3();
-        let toward = way.normalize();
-        let cosines = toward.y.max(0.0) * toward.dot(s.normal.as_dvec3()).abs();
-        f64::from(s.radiance.y) * cosines / way.length_squared() / f64::from(s.pdf_area)
-    })
+    mean(emitters, count, green)
+}
+
+/// The same, with lights chosen for that point.
+fn irradiance_for(emitters: &Emitters, count: u32) -> f64 {
+    mean_of(count, |pick, uv| green(&emitters.sample_for(Vec3::ZERO, pick, uv)))
+}
+
+/// What one sample says of that light.
+fn green(s: &EmitterSample) -> f64 {
+    let way = s.position.as_dvec3();
+    let toward = way.normalize();
+    let cosines = toward.y.max(0.0) * toward.dot(s.normal.as_dvec3()).abs();
+    f64::from(s.radiance.y) * cosines / way.length_squared() / f64::from(s.pdf_area)
 }
 
 #[test]
@@ -57,8 +67,10 @@ fn lights_of_different_strength_and_size_add_up() {
     let far = square(9, Vec3::new(1.0, 4.0, 0.5), 1.5, [Vec3::new(40.0, 20.0, 10.0); 2]);
     let apart = [near, far].map(|light| irradiance(&Emitters::new(light).expect("a light"), 20_000));
     let together = Emitters::new(near.into_iter().chain(far)).expect("lights");
-    assert_eq!((together.count(), together.bytes()), (4, 4 * 60));
-    let found = irradiance(&together, 200_000);
+    assert_eq!((together.count(), together.bytes()), (4, 4 * 68 + 2 * 28));
+    let found = irradiance(&together, 50_000);
+    assert!((found / (apart[0] + apart[1]) - 1.0).abs() < 1e-2, "{found} {apart:?}");
+    let found = irradiance_for(&together, 50_000);
     assert!((found / (apart[0] + apart[1]) - 1.0).abs() < 1e-2, "{found} {apart:?}");
 }
 
@@ -141,9 +153,65 @@ fn a_hundred_thousand_lights() {
     });
     let emitters = Emitters::new(lights).expect("lights");
     assert_eq!(emitters.count(), 100_000);
+    assert!((82..=96).contains(&(emitters.bytes() / 100_000)));
     // A light of strength s is chosen as often as s: the mean strength is that of squares by that of firsts, 67.
     let strength = mean(&emitters, 100_000, |s| f64::from(s.radiance.x));
     assert!((strength - 67.0).abs() < 0.3, "{strength}");
+}
+
+/// A street of lamps of different strength, the first over the origin.
+fn street(lamps: u32) -> Emitters {
+    let lamp = |i: u32| {
+        let place = Vec3::new(i as f32 * 3.0, 2.0 + (i % 3) as f32, (i % 7) as f32);
+        square(2 * i, place, 0.5, [Vec3::splat(1.0 + (i % 5) as f32), Vec3::ONE])
+    };
+    Emitters::new((0..lamps).rev().flat_map(lamp)).expect("lights")
+}
+
+#[test]
+fn for_any_point_all_lights_are_chosen_from() {
+    // Numbers of lights that fill a tree's leaves in different ways.
+    for lamps in [1, 2, 3, 5, 8, 33, 100] {
+        let emitters = street(lamps);
+        for point in [Vec3::ZERO, Vec3::new(40.0, 2.0, 1.0), Vec3::splat(1e6), Vec3::splat(f32::MAX)] {
+            // Each has an area of an eighth, so their densities add up to eight.
+            let sum: f32 = (0..2 * lamps).map(|primitive| emitters.pdf_area_for(point, primitive)).sum();
+            assert!((sum - 8.0).abs() < 1e-4, "{lamps} {point}: {sum}");
+            assert_eq!(emitters.pdf_area_for(point, 2 * lamps), 0.0);
+            let mut seen = std::collections::HashMap::<u32, u32>::new();
+            mean_of(4000, |pick, uv| {
+                let s = emitters.sample_for(point, pick, uv);
+                assert_eq!(s.pdf_area, emitters.pdf_area_for(point, s.primitive), "{lamps} {point}");
+                *seen.entry(s.primitive).or_default() += 1;
+                0.0
+            });
+            for (primitive, count) in seen {
+                let expected = f64::from(emitters.pdf_area_for(point, primitive)) / 8.0 * 4000.0;
+                assert!((f64::from(count) - expected).abs() < 25.0, "{lamps} {point}: {count} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn near_lights_count_for_more() {
+    let emitters = street(2000);
+    // Light by light, each on a grid.
+    let grid = (0..36).map(|i| [i % 6, i / 6].map(|k| (k as f32 + 0.5) / 6.0));
+    let one = |light: &Emitter| {
+        let pdf_area = (1.0 / light.area()) as f32;
+        grid.clone().map(|uv| green(&light.point(uv, pdf_area))).sum::<f64>() / 36.0
+    };
+    let exact: f64 = emitters.lights.iter().map(one).sum();
+    let found = irradiance_for(&emitters, 50_000);
+    assert!((found / exact - 1.0).abs() < 1e-2, "{found} {exact}");
+    // The mean square of how far off one sample is.
+    let spread = |green: &dyn Fn([f32; 2], [f32; 2]) -> f64| {
+        mean_of(20_000, |pick, uv| (green(pick, uv) / exact - 1.0).powi(2))
+    };
+    let by_power = spread(&|pick, uv| green(&emitters.sample(pick, uv)));
+    let by_distance = spread(&|pick, uv| green(&emitters.sample_for(Vec3::ZERO, pick, uv)));
+    assert!(by_distance * 100.0 < by_power, "{by_distance} {by_power}");
 }
 
 #[test]
