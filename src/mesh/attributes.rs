@@ -40,7 +40,7 @@ impl Attributes {
 }
 
 /// A unit vector in four bytes: its place on an unfolded octahedron, 16 bits each way (Cigolle et al., "A survey
-/// of efficient representations for independent unit vectors", 2014). Off by 4e-5 at most.
+/// of efficient representations for independent unit vectors", 2014). Off by 7e-5 at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Normal([i16; 2]);
@@ -90,7 +90,7 @@ mod tests {
             let vector = Vec3::new(x, y, z);
             prop_assume!(vector.length() > 1e-3);
             let back = Normal::encode(vector * (size as f32).exp2()).decode();
-            prop_assert!(back.distance(vector.normalize()) < 4.5e-5, "{vector} {back}");
+            prop_assert!(back.distance(vector.normalize()) < 7e-5, "{vector} {back}");
         }
     }
 

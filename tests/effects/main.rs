@@ -1,0 +1,7 @@
+//! Pictures with effects: each against what theory says of it, all of them against changes of the machine's part.
+
+mod cut_outs;
+mod invariance;
+mod physics;
+mod scenes;
+mod unused;
