@@ -89,7 +89,10 @@ mod dispatch {
 
     #[test]
     fn other_endings_are_refused_with_what_is_accepted() {
-        assert_says(&refusal("a.stl", "solid"), &["unknown kind of file", ".stl", ".obj", ".ply"]);
+        assert_says(
+            &refusal("a.fbx", "solid"),
+            &["unknown kind of file", ".fbx", ".obj", ".ply", ".stl", ".gltf", ".glb"],
+        );
         assert_says(&refusal("model", ""), &["unknown kind of file", ".obj", ".ply"]);
     }
 
