@@ -79,8 +79,8 @@ fn merge(models: Vec<tobj::Model>, extras: Extras, report: &mut ReadReport) -> R
         ));
     }
     let vertices = models.iter().map(|m| m.mesh.positions.len() / 3).sum();
-    let used = |(_, material): &(usize, Option<u32>)| material.is_some();
-    let by_material = runs.iter().any(used)
+    let known = |(_, material): &(usize, Option<u32>)| material.is_some();
+    let by_material = runs.iter().any(known)
         && (colored_vertices == 0
             || runs.iter().filter_map(|run| run.1).any(|m| outdoes_colors(&materials[m as usize])));
     let colored = colored_vertices > 0 && !by_material;
