@@ -84,7 +84,7 @@ impl Model {
             looks: Looks::Mesh(self.mesh),
             origin: Origin::Built {
                 read_seconds: self.seconds,
-                read_report: self.report,
+                read_report: self.report.map(Box::new),
                 build_seconds,
                 build_memory,
             },

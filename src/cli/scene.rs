@@ -53,7 +53,7 @@ pub enum Origin {
         /// Seconds of reading or generating.
         read_seconds: f64,
         /// What the reader has to say; `None` for what was not read.
-        read_report: Option<ReadReport>,
+        read_report: Option<Box<ReadReport>>,
         /// Seconds of building.
         build_seconds: f64,
         /// The memory that the build took.
@@ -215,7 +215,7 @@ impl Scene {
         match &self.origin {
             Origin::Built { read_seconds, read_report, build_seconds, build_memory } => {
                 lines.add(if read_report.is_some() { "read" } else { "generated" }, duration(*read_seconds));
-                let summary = read_report.as_ref().map(ReadReport::summary).unwrap_or_default();
+                let summary = read_report.as_deref().map(ReadReport::summary).unwrap_or_default();
                 if !summary.is_empty() {
                     lines.add("repaired", summary);
                 }
