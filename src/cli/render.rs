@@ -15,12 +15,11 @@ use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
-use crate::render::{First, RenderSettings, Renderer, Size, Tuning};
+use crate::render::{First, RenderSettings, Renderer, Size, Tuning, memory_beside};
 use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::store::{self, is_scene};
-use crate::study::heat::Cost;
 use crate::traverse::Kernel;
 use report::{FirstShot, Report, Shot};
 use std::path::{Path, PathBuf};
@@ -75,11 +74,12 @@ pub struct Args {
     accuracy: AccuracyOption,
     #[command(flatten)]
     cache: CacheArgs,
-    /// Write what each pixel's ray costs instead of what it sees: .png in colours, .exr or .pfm as numbers
+    /// Write what each pixel's ray costs instead of what it sees, or how many rays it casts for an effect: .png in
+    /// colours, .exr or .pfm as numbers
     #[arg(
         long,
-        value_name = "steps|tests|leaves|time",
-        conflicts_with_all = ["orbit", "samples", "depth", "normals"]
+        value_name = "steps|tests|leaves|time|EFFECT",
+        conflicts_with_all = ["orbit", "depth", "normals"]
     )]
     heatmap: Option<String>,
     /// Leave out the shadows
@@ -115,7 +115,7 @@ pub fn run(args: &Args) -> Result<()> {
     args.looks.check()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
     let orbit = args.orbit()?;
-    let heatmap = args.heatmap.as_deref().map(str::parse::<Cost>).transpose()?;
+    let heatmap = args.heatmap.as_deref().map(heat::Shown::parse).transpose()?;
     let others: Vec<_> = args.scene.as_deref().into_iter().chain(args.json.file()).collect();
     args.outputs.check(args.orbit, &others)?;
     args.json.check()?;
@@ -133,8 +133,8 @@ pub fn run(args: &Args) -> Result<()> {
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
-    if let Some(cost) = heatmap {
-        return heat::run(&scene, camera, settings.size, cost, args.outputs.picture(), &args.json);
+    if let Some(shown) = heatmap {
+        return args.heat(&scene, camera, settings, shown);
     }
     let cameras: Vec<Camera> = orbit.map_or_else(|| vec![camera], |orbit| orbit.cameras(camera).collect());
     match &scene.looks {
@@ -172,8 +172,71 @@ impl Args {
         let threads = settings.tuning.worker_count();
         // The picture that a frame was at first stays until the frame is complete.
         let frames = 1 + usize::from(self.first_within.is_some());
-        let beside = frames * settings.frame_bytes() + options.loading.workers(threads) * BYTES_PER_WORKER;
-        Scene::open_within(&store::File::open(path)?, &options, [memory, beside], threads, isa)
+        let file = store::File::open(path)?;
+        let workers = options.loading.workers(threads);
+        let meta = file.meta();
+        let request = self.looks.check()?;
+        let effects = memory_beside(meta.colors.materials(), &meta.uses, &file.images(), &request, workers);
+        let beside = frames * settings.frame_bytes() + workers * BYTES_PER_WORKER + effects;
+        Scene::open_within(&file, &options, [memory, beside], threads, isa)
+    }
+
+    /// Draws what pixels cost.
+    fn heat(
+        &self,
+        scene: &Scene,
+        camera: Camera,
+        settings: RenderSettings,
+        shown: heat::Shown,
+    ) -> Result<()> {
+        let heat::Shown::Rays(effect) = shown else {
+            if self.samples.is_some() {
+                return Err(Error::option(
+                    "--samples",
+                    "one ray through each pixel is looked at; leave it out",
+                ));
+            }
+            let costs = |cost| heat::costs(scene, &camera, settings.size, cost);
+            let heat::Shown::Cost(cost) = shown else { unreachable!("it is one of both") };
+            return heat::give(
+                scene,
+                camera,
+                settings.size,
+                shown,
+                &costs(cost),
+                self.outputs.picture(),
+                &self.json,
+            );
+        };
+        match &scene.looks {
+            Looks::Mesh(mesh) => self.heat_of(scene, mesh, camera, settings, effect),
+            Looks::Stored(stored) => self.heat_of(scene, stored, camera, settings, effect),
+            Looks::Cached(cached) => self.heat_of(scene, cached, camera, settings, effect),
+        }
+    }
+
+    /// Draws how many rays pixels cast for an effect.
+    fn heat_of(
+        &self,
+        scene: &Scene,
+        surface: &impl Surface,
+        camera: Camera,
+        settings: RenderSettings,
+        effect: Effect,
+    ) -> Result<()> {
+        let size = settings.size;
+        let lighting = scene.reading(|| self.lighting(&camera, scene))?;
+        let staged = self.looks.stage(scene, surface, &camera, lighting, (self.samples, !self.no_shadows))?;
+        let settings = RenderSettings { samples: staged.samples, ..settings };
+        let mut renderer = Renderer::new(&scene.accel, surface, settings)?;
+        if let Some(appearance) = &staged.appearance {
+            renderer = renderer.with_appearance(appearance)?;
+        }
+        let tiles_done = AtomicUsize::new(0);
+        let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / renderer.tile_count() as f64;
+        let counts = watch("counting", fraction, || renderer.rays_of(effect, &camera, &tiles_done))?;
+        let shown = heat::Shown::Rays(effect);
+        heat::give(scene, camera, size, shown, &counts, self.outputs.picture(), &self.json)
     }
 
     /// Renders a frame for each camera, the first of which the light is made for, and reports.

@@ -21,6 +21,12 @@ impl Attributes {
     /// Of a triangle of which the model says nothing.
     pub const NONE: Self = Self { uv: [[0.0; 2]; 3], normals: [Normal::NONE; 3] };
 
+    /// Whether all corners have a normal.
+    #[inline]
+    pub fn has_normals(&self) -> bool {
+        !self.normals.contains(&Normal::NONE)
+    }
+
     /// The texture coordinates where a hit's barycentrics are `u` and `v`.
     #[inline]
     pub fn uv_at(&self, u: f32, v: f32) -> Vec2 {
@@ -31,7 +37,7 @@ impl Attributes {
     /// The unit normal between those of the corners, if all of them have one and they do not cancel.
     #[inline]
     pub fn normal_at(&self, u: f32, v: f32) -> Option<Vec3> {
-        if self.normals.contains(&Normal::NONE) {
+        if !self.has_normals() {
             return None;
         }
         let [a, b, c] = self.normals.map(Normal::decode);

@@ -14,6 +14,7 @@ use crate::mesh::Mesh;
 use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
+use glam::Vec3;
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -120,6 +121,25 @@ impl<'a, S: Surface> Renderer<'a, S> {
         self.drawn(&wanted).map(|drawn| (drawn.first, drawn.frame, drawn.stats))
     }
 
+    /// How many rays of an effect each pixel's samples cast, on average, row by row from the top. Of no effect, and in
+    /// a renderer that [shows none](Self::with_appearance), none.
+    ///
+    /// # Errors
+    /// As [`frame_with_progress`](Self::frame_with_progress).
+    pub fn rays_of(&self, effect: Effect, camera: &Camera, tiles_done: &AtomicUsize) -> Result<Vec<f32>> {
+        let Some(appearance) = self.appearance else {
+            return Ok(vec![0.0; self.settings.size.pixels() as usize]);
+        };
+        let lighting = Lighting::outdoors(Vec3::Y, Vec3::Y);
+        let wanted = Wanted { camera, lighting: &lighting, tiles_done, limit: None };
+        let count = || self.drawn_with_effects(appearance, &wanted, Some(effect)).frame;
+        let frame = match self.accel.cached() {
+            Some(cached) => cached.or_error(count)?,
+            None => count(),
+        };
+        Ok(frame.color.into_iter().map(|[count, ..]| count).collect())
+    }
+
     fn drawn(&self, wanted: &Wanted<'_>) -> Result<Drawn> {
         match self.accel.cached() {
             Some(cached) => {
@@ -137,7 +157,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let first = wanted
             .limit
             .and_then(|_| self.drawn_plain(&Wanted { tiles_done: &AtomicUsize::new(0), ..*wanted }).first);
-        Drawn { first, ..self.drawn_with_effects(appearance, wanted) }
+        Drawn { first, ..self.drawn_with_effects(appearance, wanted, None) }
     }
 
     fn drawn_plain(&self, wanted: &Wanted<'_>) -> Drawn {
@@ -201,7 +221,12 @@ impl<'a, S: Surface> Renderer<'a, S> {
         Drawn { first, frame, stats: self.stats(&outcome, threads, start.elapsed().as_secs_f64()) }
     }
 
-    fn drawn_with_effects(&self, appearance: &Appearance, wanted: &Wanted<'_>) -> Drawn {
+    fn drawn_with_effects(
+        &self,
+        appearance: &Appearance,
+        wanted: &Wanted<'_>,
+        counted: Option<Effect>,
+    ) -> Drawn {
         let start = Instant::now();
         let RenderSettings { size, samples, aovs, ref tuning, .. } = self.settings;
         let task = EffectTask {
@@ -209,6 +234,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             view: wanted.camera.view(size.width, size.height),
             samples,
             error: appearance.limits.error,
+            counted,
         };
         if let Some(cached) = self.accel.cached() {
             cached.begin_frame();
@@ -216,7 +242,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let mut tiled = TiledFrame::new(size, aovs);
         let outcome = self.workers().run(
             self.jobs(&mut tiled),
-            || EffectScratch::new(self.learnt.take()),
+            || EffectScratch::new(self.learnt.take(), counted.is_some()),
             |scratch: &mut EffectScratch, pixels: TilePixels<'_>| {
                 task.render(scratch, pixels);
                 wanted.tiles_done.fetch_add(1, Ordering::Relaxed);

@@ -16,6 +16,7 @@ pub struct CachedSurface {
     paint: CachedPaint,
     /// Whether there is a record for each triangle, which has its material then.
     has_attributes: bool,
+    has_normals: bool,
     materials: Vec<Material>,
     images: Vec<Image>,
     uses: Vec<u64>,
@@ -55,6 +56,7 @@ impl CachedSurface {
             cached,
             paint,
             has_attributes: meta.attributes,
+            has_normals: meta.normals,
             materials: meta.colors.materials().to_vec(),
             images: file.images(),
             uses: meta.uses.clone(),
@@ -181,6 +183,10 @@ impl Surface for CachedSurface {
 
     fn has_attributes(&self) -> bool {
         self.has_attributes
+    }
+
+    fn has_normals(&self) -> bool {
+        self.has_normals
     }
 
     fn uses(&self) -> Vec<u64> {

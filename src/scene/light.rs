@@ -4,7 +4,7 @@
 //! the sky comes out at about 1, the brightest value that a PNG holds.
 
 use super::{Camera, Emitters};
-use crate::geometry::Ray;
+use crate::geometry::{Hit, Ray};
 use crate::traverse::Accel;
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -124,7 +124,7 @@ impl Lighting {
         let from = |[over, left, behind]: [f32; 3]| upward * over - right * left - ahead * behind;
         let sun = Self::outdoors(upward, from([1.25, 0.95, 0.55]).normalize());
 
-        let seen = Seen::new(camera, accel);
+        let seen = Seen::new(camera, accel, &|_| false);
         if seen.share_in(&sun.key, accel) >= ENOUGH {
             return sun;
         }
@@ -157,6 +157,19 @@ impl Lighting {
 /// The part of what is seen that is to lie in the key light.
 pub(super) const ENOUGH: f32 = 0.3;
 
+/// What a ray hits behind at most so many surfaces that let light pass.
+fn first_opaque(accel: &Accel, mut ray: Ray, lets_pass: &impl Fn(u32) -> bool) -> Hit {
+    const LAYERS: usize = 16;
+    for _ in 0..LAYERS {
+        let hit = accel.intersect(&ray);
+        if !hit.is_hit() || !lets_pass(hit.primitive) {
+            return hit;
+        }
+        ray.tnear = hit.t.next_up();
+    }
+    Hit::MISS
+}
+
 /// Rays to lights from each point.
 const PROBES: u32 = 8;
 
@@ -175,14 +188,14 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Looks through the camera.
-    pub fn new(camera: &Camera, accel: &Accel) -> Self {
+    /// Looks through the camera, and through what lets light pass.
+    pub fn new(camera: &Camera, accel: &Accel, lets_pass: &impl Fn(u32) -> bool) -> Self {
         const GRID: u32 = 16;
         let view = camera.view(GRID, GRID);
         let (mut points, mut depths) = (Vec::new(), Vec::new());
         for i in 0..GRID * GRID {
             let ray = view.ray(i % GRID, i / GRID, [0.5, 0.5]);
-            let hit = accel.intersect(&ray);
+            let hit = first_opaque(accel, ray, lets_pass);
             if hit.is_hit() {
                 let side = -hit.normal.dot(ray.direction).signum();
                 points.push((ray.at(hit.t * 0.9995), hit.normal * side));
@@ -195,7 +208,7 @@ impl Seen {
     }
 
     /// The part of the points that some surfaces throw light on which can be seen; all of them if there are none.
-    pub fn share_lit_by(&self, emitters: &Emitters, accel: &Accel) -> f32 {
+    pub fn share_lit_by(&self, emitters: &Emitters, accel: &Accel, lets_pass: &impl Fn(u32) -> bool) -> f32 {
         let sees = |&&(point, normal): &&(Vec3, Vec3)| {
             let light: f32 = (0..PROBES)
                 .map(|probe| {
@@ -205,7 +218,8 @@ impl Seen {
                     let way = light.position - point;
                     let squared = way.length_squared();
                     let cosines = normal.normalize_or_zero().dot(way).max(0.0) * light.normal.dot(way).abs();
-                    if cosines <= 0.0 || accel.occluded(&Ray::segment(point, way, 0.0, 0.999)) {
+                    let ray = Ray::segment(point, way, 0.0, 0.999);
+                    if cosines <= 0.0 || first_opaque(accel, ray, lets_pass).is_hit() {
                         return 0.0;
                     }
                     light.radiance.max_element() * cosines / (squared * squared * light.pdf_area * PI)
@@ -307,7 +321,7 @@ mod tests {
         let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
         let camera = Camera { fov: 35.0, ..Camera::new(Vec3::Z * 4.0, Vec3::ZERO) };
         let lighting = Lighting::for_view(&camera, &accel);
-        assert!(Seen::new(&camera, &accel).share_in(&lighting.key, &accel) >= ENOUGH);
+        assert!(Seen::new(&camera, &accel, &|_| false).share_in(&lighting.key, &accel) >= ENOUGH);
     }
 
     #[test]

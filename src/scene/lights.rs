@@ -21,18 +21,19 @@ pub struct Lights {
 impl Lights {
     /// The light of a scene. One that is lit by its own lights, so that enough of what a camera sees of it is seen
     /// by them, or by an environment, gets no other; where a few lamps glow on a dashboard, `lighting` is there
-    /// as well.
+    /// as well. `lets_pass` says of triangles whether they are as clear as glass.
     pub fn for_view(
         camera: &Camera,
         accel: &Accel,
+        lets_pass: &impl Fn(u32) -> bool,
         lighting: &Lighting,
         emitters: Option<Emitters>,
         environment: Option<Environment>,
     ) -> Self {
         let is_lit = environment.is_some()
-            || emitters
-                .as_ref()
-                .is_some_and(|emitters| Seen::new(camera, accel).share_lit_by(emitters, accel) >= ENOUGH);
+            || emitters.as_ref().is_some_and(|emitters| {
+                Seen::new(camera, accel, lets_pass).share_lit_by(emitters, accel, lets_pass) >= ENOUGH
+            });
         let (key, ambient) = if is_lit { (None, None) } else { (Some(lighting.key), Some(lighting.ambient)) };
         Self { key, ambient, emitters, environment }
     }

@@ -28,6 +28,8 @@ pub trait Surface: Sync {
     fn images(&self) -> &[Image];
     /// Whether any triangle has texture coordinates or normals.
     fn has_attributes(&self) -> bool;
+    /// Whether any triangle has normals.
+    fn has_normals(&self) -> bool;
     /// How many triangles each of the materials has.
     fn uses(&self) -> Vec<u64>;
     /// The triangles whose material gives off light, in the order of their numbers.
@@ -136,6 +138,10 @@ impl Surface for Mesh {
         !self.attributes.is_empty()
     }
 
+    fn has_normals(&self) -> bool {
+        self.attributes.iter().any(Attributes::has_normals)
+    }
+
     fn uses(&self) -> Vec<u64> {
         self.colors.uses()
     }
@@ -178,6 +184,10 @@ impl Surface for Stored {
 
     fn has_attributes(&self) -> bool {
         self.has_attributes()
+    }
+
+    fn has_normals(&self) -> bool {
+        self.has_normals()
     }
 
     fn uses(&self) -> Vec<u64> {

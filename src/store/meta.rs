@@ -2,7 +2,7 @@
 
 use crate::geometry::Aabb;
 use crate::kdtree::{BuildParams, KdTree, SPREAD_BLOCKS, Scale, Tree, TreeStats};
-use crate::mesh::{Colors, MAX_IMAGE_BYTES, Material, Mesh};
+use crate::mesh::{Attributes, Colors, MAX_IMAGE_BYTES, Material, Mesh};
 use serde::{Deserialize, Serialize};
 
 /// What writes files.
@@ -42,6 +42,8 @@ pub struct Meta {
     pub uses: Vec<u64>,
     /// Whether triangles have texture coordinates or normals: in the section `surface-records`.
     pub attributes: bool,
+    /// Whether any of them has normals.
+    pub normals: bool,
     /// The pictures that materials name, in the order of their numbers.
     pub images: Vec<ImageMeta>,
 }
@@ -110,6 +112,7 @@ impl Meta {
             colors: ColorMeta::of(&mesh.colors),
             uses: mesh.colors.uses(),
             attributes: !mesh.attributes.is_empty(),
+            normals: mesh.attributes.iter().any(Attributes::has_normals),
             images: Vec::new(),
         }
     }

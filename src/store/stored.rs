@@ -21,6 +21,7 @@ pub struct Stored {
     paint: Paint,
     /// Empty if there are no attributes.
     records: Column<SurfaceRecord>,
+    has_normals: bool,
     materials: Vec<Material>,
     images: Vec<Image>,
     uses: Vec<u64>,
@@ -80,6 +81,7 @@ impl File {
             corners,
             paint,
             records: self.records()?,
+            has_normals: self.meta().normals,
             materials: self.meta().colors.materials().to_vec(),
             images: self.images(),
             uses: self.meta().uses.clone(),
@@ -156,6 +158,11 @@ impl Stored {
     /// Whether any triangle has texture coordinates or normals.
     pub fn has_attributes(&self) -> bool {
         !self.records.is_empty()
+    }
+
+    /// Whether any triangle has normals.
+    pub fn has_normals(&self) -> bool {
+        self.has_normals
     }
 
     /// The materials; none if the colours are of another kind.

@@ -55,7 +55,10 @@ impl FromStr for Cost {
 
     fn from_str(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|cost| cost.name() == name).ok_or_else(|| {
-            Error::option("--heatmap", format!("\"{name}\" is not one of steps, tests, leaves, time"))
+            Error::option(
+                "--heatmap",
+                format!("\"{name}\" is not one of steps, tests, leaves, time, nor an effect"),
+            )
         })
     }
 }

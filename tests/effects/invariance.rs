@@ -16,11 +16,12 @@ fn room() -> Mesh {
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut bytes, image::ImageFormat::Png).expect("into memory");
     let image = Image { name: "picture.png".into(), source: ImageSource::Bytes(bytes.into_inner().into()) };
-    let mut scene = Builder { images: vec![image], ..Builder::default() };
+    let mut scene = Builder::with_image(image);
     let white = scene.material(Material::matt("white", Vec3::splat(0.8)));
     let lamp = scene.material(Material { emission: Vec3::splat(12.0), ..Material::matt("lamp", Vec3::ZERO) });
     let specular = Vec3::new(0.9, 0.8, 0.7);
-    let mirror = Material { specular, reflects: true, roughness: 0.0, ..Material::matt("mirror", Vec3::ZERO) };
+    let mirror =
+        Material { specular, reflects: true, roughness: 0.0, ..Material::matt("mirror", Vec3::ZERO) };
     let gloss = scene.material(Material { roughness: 0.2, fresnel: true, ..mirror.clone() });
     let mirror = scene.material(mirror);
     let glass = scene.material(Material {
@@ -55,7 +56,12 @@ fn room() -> Mesh {
 }
 
 fn shot() -> Shot {
-    Shot { size: 40, samples: Some(3), bounces: 6, ..Shot::new(Vec3::new(0.0, 2.0, 6.0), Vec3::new(0.0, 1.8, 0.0)) }
+    Shot {
+        size: 40,
+        samples: Some(3),
+        bounces: 6,
+        ..Shot::new(Vec3::new(0.0, 2.0, 6.0), Vec3::new(0.0, 1.8, 0.0))
+    }
 }
 
 #[test]
@@ -67,7 +73,8 @@ fn the_picture_is_the_same_for_all_threads_tiles_kernels_and_instruction_sets() 
     assert!(light.is_finite() && light > 500.0, "{light}");
     for (effect, cost) in stats.costs.iter() {
         use raypack::scene::effects::Effect::*;
-        let casts = matches!(effect, SoftShadows | Reflection | Glossy | Refraction | Transparency | Interreflection);
+        let casts =
+            matches!(effect, SoftShadows | Reflection | Glossy | Refraction | Transparency | Interreflection);
         assert!(!casts || cost.rays > 0, "{effect} ran and cast nothing");
     }
     for isa in Isa::available() {
@@ -76,7 +83,8 @@ fn the_picture_is_the_same_for_all_threads_tiles_kernels_and_instruction_sets() 
             [(Kernel::Tile, 32, 2), (Kernel::Tile, 5, 3), (Kernel::Stream, 16, 2), (Kernel::Packet16, 64, 1)]
         {
             let (frame, _) = shot().with(&accel, &mesh, |settings| {
-                (settings.tuning.packet, settings.tuning.tile, settings.tuning.threads) = (kernel, tile, threads);
+                (settings.tuning.packet, settings.tuning.tile, settings.tuning.threads) =
+                    (kernel, tile, threads);
             });
             assert!(frame.color == expected.color, "{kernel} on {isa}, tiles of {tile}, {threads} threads");
         }

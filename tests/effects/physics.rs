@@ -5,6 +5,9 @@ use raypack::Vec3;
 use raypack::mesh::{Material, Mesh};
 use raypack::scene::effects::Effect;
 
+/// No light but that of the scene.
+const BLACK: Option<Vec3> = Some(Vec3::ZERO);
+
 fn lamp(radiance: Vec3) -> Material {
     Material { emission: radiance, ..Material::matt("lamp", Vec3::ZERO) }
 }
@@ -39,6 +42,7 @@ fn ahead() -> Shot {
     let mut shot = Shot::new(Vec3::ZERO, Vec3::NEG_Z);
     shot.camera.fov = 0.5;
     shot.samples = Some(1);
+    shot.environment = BLACK;
     shot
 }
 
@@ -161,7 +165,8 @@ fn from_under_water_the_surface_is_a_mirror_beyond_the_critical_angle() {
     let up = |degrees: f32| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let eye = Vec3::new(0.0, -5.0, 0.0);
-        let mut shot = Shot { samples: Some(1), ..Shot::new(eye, eye + Vec3::new(0.0, cos, -sin)) };
+        let mut shot =
+            Shot { samples: Some(1), environment: BLACK, ..Shot::new(eye, eye + Vec3::new(0.0, cos, -sin)) };
         shot.camera.fov = 0.5;
         shot.mean(&mesh)
     };
@@ -183,7 +188,8 @@ fn a_lamp_lights_a_floor_by_its_form_factor() {
     let r = (half * half + height * height).sqrt();
     let corner = (2.0 * half / r) * (half / r).atan() / std::f64::consts::TAU;
     let expected = 0.5 * 5.0 * 4.0 * corner;
-    let mut shot = Shot { samples: Some(64), ..Shot::new(Vec3::new(0.0, 1.0, 0.01), Vec3::ZERO) };
+    let mut shot =
+        Shot { samples: Some(64), environment: BLACK, ..Shot::new(Vec3::new(0.0, 1.0, 0.01), Vec3::ZERO) };
     shot.camera.fov = 0.5;
     // Nothing but the lamp is there for the floor's light to come back from, and the lamp is black.
     assert_light(shot.mean(&mesh), Vec3::splat(expected as f32), 0.01);
@@ -196,7 +202,7 @@ fn a_lamp_lights_a_floor_by_its_form_factor() {
     scene.square(lamp, Vec3::new(-1.0, 2.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0);
     scene.square(black, Vec3::new(-9.0, 1.5, -9.0), Vec3::X * 18.0, Vec3::Z * 18.0);
     scene.square(floor, Vec3::new(-5.0, 0.0, -5.0), Vec3::Z * 10.0, Vec3::X * 10.0);
-    let dark = Shot { effects: "emission,soft-shadows", ..shot };
+    let dark = Shot { bounces: 0, ..shot };
     assert_eq!(dark.mean(&scene.mesh()), Vec3::ZERO);
 }
 
@@ -218,7 +224,8 @@ fn a_lens_blurs_what_it_is_not_focused_to_and_nothing_else() {
     scene.square(lamp, Vec3::new(0.0, -50.0, -10.0), Vec3::X * 100.0, Vec3::Y * 100.0);
     let mesh = scene.mesh();
     let between = |aperture: f32, focus: f32| {
-        let mut shot = Shot { samples: Some(64), size: 32, ..Shot::new(Vec3::ZERO, Vec3::NEG_Z) };
+        let mut shot =
+            Shot { samples: Some(64), size: 32, environment: BLACK, ..Shot::new(Vec3::ZERO, Vec3::NEG_Z) };
         (shot.camera.aperture, shot.camera.focus, shot.camera.fov) = (aperture, Some(focus), 20.0);
         let (frame, _) = shot.of(&mesh);
         frame.color.iter().filter(|c| c[0] > 0.02 && c[0] < 0.98).count()

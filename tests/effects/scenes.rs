@@ -15,10 +15,15 @@ pub struct Builder {
     of_triangle: Vec<u32>,
     attributes: Vec<Attributes>,
     materials: Vec<Material>,
-    pub images: Vec<Image>,
+    images: Vec<Image>,
 }
 
 impl Builder {
+    /// A scene whose maps may name one picture, number 0.
+    pub fn with_image(image: Image) -> Self {
+        Self { images: vec![image], ..Self::default() }
+    }
+
     /// Adds a material and gives its number.
     pub fn material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
@@ -48,7 +53,13 @@ impl Builder {
 
     pub fn mesh(self) -> Mesh {
         let Self { positions, triangles, of_triangle, attributes, materials, images } = self;
-        Mesh { positions, triangles, colors: Colors::PerMaterial { materials, of_triangle }, attributes, images }
+        Mesh {
+            positions,
+            triangles,
+            colors: Colors::PerMaterial { materials, of_triangle },
+            attributes,
+            images,
+        }
     }
 }
 

@@ -21,7 +21,12 @@ fn rays(mesh: &Mesh, effects: &'static str) -> Vec<(Effect, u64)> {
 }
 
 fn shiny() -> Material {
-    Material { specular: Vec3::splat(0.5), reflects: true, roughness: 0.0, ..Material::matt("shiny", Vec3::X) }
+    Material {
+        specular: Vec3::splat(0.5),
+        reflects: true,
+        roughness: 0.0,
+        ..Material::matt("shiny", Vec3::X)
+    }
 }
 
 #[test]
@@ -52,7 +57,10 @@ fn what_is_not_asked_for_has_no_place_in_a_list() {
     };
     let mesh = scene(glass);
     let ran = rays(&mesh, "refraction,shadows");
-    assert_eq!(ran.iter().map(|(effect, _)| *effect).collect::<Vec<_>>(), [Effect::Shadows, Effect::Refraction]);
+    assert_eq!(
+        ran.iter().map(|(effect, _)| *effect).collect::<Vec<_>>(),
+        [Effect::Shadows, Effect::Refraction]
+    );
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! OBJ and PLY as scanners and CAD programs write them, and as they break; that the others are found by their ending.
 
-mod materials;
 mod endings;
+mod materials;
 mod obj;
 mod ply;
 

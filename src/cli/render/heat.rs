@@ -3,15 +3,51 @@
 use crate::cli::progress::watch;
 use crate::cli::report::{ENGINE, Engine, Json, Lines};
 use crate::cli::scene::{Scene, SceneReport};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::render::Size;
 use crate::render::image::write_heat;
 use crate::scene::Camera;
+use crate::scene::effects::Effect;
 use crate::study::heat::{Cost, Spread, map};
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
+
+/// What is shown of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum Shown {
+    /// What a ray through the middle costs.
+    Cost(Cost),
+    /// The rays that a sample casts for an effect, on average.
+    Rays(Effect),
+}
+
+impl Shown {
+    /// Reads `--heatmap`.
+    ///
+    /// # Errors
+    /// There is no such thing, or an effect casts no rays.
+    pub fn parse(name: &str) -> Result<Self> {
+        let Ok(effect) = name.parse::<Effect>() else { return name.parse().map(Self::Cost) };
+        if effect.casts_rays() {
+            return Ok(Self::Rays(effect));
+        }
+        let others: Vec<&str> =
+            Effect::ALL.iter().filter(|effect| effect.casts_rays()).map(|effect| effect.name()).collect();
+        let message =
+            format!("{effect} casts no rays of its own; of effects these do: {}", others.join(", "));
+        Err(Error::option("--heatmap", message))
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Cost(cost) => cost.name(),
+            Self::Rays(effect) => effect.name(),
+        }
+    }
+}
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -21,25 +57,37 @@ struct Report<'a> {
     file: &'a Path,
     camera: Camera,
     size: Size,
-    heatmap: Cost,
+    heatmap: Shown,
     spread: Spread,
 }
 
-/// Measures all pixels, writes the picture and reports.
-pub fn run(scene: &Scene, camera: Camera, size: Size, heatmap: Cost, file: &Path, json: &Json) -> Result<()> {
+/// Measures what all pixels cost.
+pub fn costs(scene: &Scene, camera: &Camera, size: Size, cost: Cost) -> Vec<f32> {
     let rows = AtomicU32::new(0);
-    let costs = watch(
+    watch(
         "measuring",
         || f64::from(rows.load(Ordering::Relaxed)) / f64::from(size.height),
         || {
-            map(&scene.accel, &camera, size, heatmap, || {
+            map(&scene.accel, camera, size, cost, || {
                 rows.fetch_add(1, Ordering::Relaxed);
             })
         },
-    );
-    let spread = Spread::of(&costs);
+    )
+}
+
+/// Writes the picture and reports.
+pub fn give(
+    scene: &Scene,
+    camera: Camera,
+    size: Size,
+    heatmap: Shown,
+    costs: &[f32],
+    file: &Path,
+    json: &Json,
+) -> Result<()> {
+    let spread = Spread::of(costs);
     let brightest = spread.percentile_99.max(f32::MIN_POSITIVE);
-    write_heat(file, size, &costs, |cost| {
+    write_heat(file, size, costs, |cost| {
         let color = ViridisRGB.get_color((cost / brightest).min(1.0));
         [color.0, color.1, color.2]
     })?;
@@ -48,12 +96,16 @@ pub fn run(scene: &Scene, camera: Camera, size: Size, heatmap: Cost, file: &Path
     let mut lines = Lines::default();
     scene.describe(&mut lines);
     lines.add("camera", camera.to_string());
-    let unit = if heatmap == Cost::Time { " ns" } else { "" };
+    let unit = if heatmap == Shown::Cost(Cost::Time) { " ns" } else { "" };
+    let of = match heatmap {
+        Shown::Cost(_) => "of a pixel's ray, traced alone",
+        Shown::Rays(_) => "rays for each sample of a pixel",
+    };
     let Spread { mean, median, percentile_99, greatest } = spread;
     lines.add(
         heatmap.name(),
         format!(
-            "of a pixel's ray, traced alone: {mean:.1}{unit} on average, {median:.0} in the middle, 99 % at most \
+            "{of}: {mean:.1}{unit} on average, {median:.0} in the middle, 99 % at most \
              {percentile_99:.0}, {greatest:.0} at most"
         ),
     );

@@ -89,7 +89,7 @@ impl Appearance {
                 set,
             },
             direct: Direct { lights, set, reach: diagonal * REACH },
-            bounce: Bounce { set, limit: limits.bounces, lights_are_sampled: lights.emitters.is_some() },
+            bounce: Bounce { set, limit: limits.bounces },
             holes,
             set,
         }

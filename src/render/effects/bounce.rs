@@ -3,7 +3,9 @@
 use super::path::{Path, Use, Way};
 use super::point::Point;
 use crate::geometry::Ray;
-use crate::render::scatter::{Basis, Medium, Sequence, cosine_hemisphere, dielectric, ggx, refract, schlick};
+use crate::render::scatter::{
+    Basis, Medium, Sequence, cosine_density, cosine_hemisphere, dielectric, ggx, refract, schlick,
+};
 use crate::scene::effects::{Effect, EffectSet, SMOOTH};
 use glam::Vec3;
 
@@ -40,8 +42,6 @@ pub struct Bounce {
     pub set: EffectSet,
     /// Surfaces that a path may meet after the first.
     pub limit: u32,
-    /// Whether surfaces that give off light are looked for from every matt surface.
-    pub lights_are_sampled: bool,
 }
 
 /// Below this part of the light, a path goes on by chance, and counts for more if it does.
@@ -180,6 +180,12 @@ impl Bounce {
         self.send(path, point, sequence, Way::Through, going, next);
     }
 
+    /// Whether matt surfaces send rays on to look for the light that others throw on them.
+    #[inline]
+    pub fn looks_around(&self, path: &Path) -> bool {
+        self.set.has(Effect::Interreflection) && u32::from(path.depth) < self.limit
+    }
+
     /// Looks for the light that other surfaces throw on this one.
     pub fn diffuse(
         &self,
@@ -223,18 +229,26 @@ impl Bounce {
         }
         let mut cone = path.cone.propagate(point.distance);
         cone.spread = spread;
+        let before = path;
         let mut path = Path {
             ray: Ray::new(origin, toward),
             depth: path.depth + 1,
             way,
-            sees_lights: way.sees_lights() || !self.lights_are_sampled,
+            density: 0.0,
+            from: origin,
             branch: path.branch_of(way),
             weight,
             cone,
-            ..*path
+            ..*before
         };
-        if way == Way::Through {
-            path.sees_lights = true;
+        match way {
+            // As if there had been nothing.
+            Way::Through => (path.density, path.from) = (before.density, before.from),
+            Way::Refraction if point.material.ior == 1.0 => {
+                (path.density, path.from) = (before.density, before.from);
+            }
+            Way::Diffuse => path.density = cosine_density(point.normal.dot(toward)),
+            _ => {}
         }
         if strength < FAINT {
             let stays = strength / FAINT;

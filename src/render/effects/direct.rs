@@ -4,7 +4,9 @@ use super::bounce::Scattered;
 use super::path::{Path, Use};
 use super::point::Point;
 use crate::geometry::Ray;
-use crate::render::scatter::{Basis, Sequence, cosine_hemisphere, ggx};
+use crate::render::scatter::{
+    Basis, Sequence, by_solid_angle, cosine_density, cosine_hemisphere, ggx, power_heuristic,
+};
 use crate::scene::effects::{Effect, EffectSet};
 use crate::scene::{Lights, ShadowRay};
 use glam::Vec3;
@@ -33,14 +35,15 @@ pub struct Direct<'a> {
 
 impl Direct<'_> {
     /// Adds to `sum` the light that arrives at a matt surface whatever is in the way, and to `rays` what depends on
-    /// that. `weight` is the part that the eye gets of what is thrown back.
+    /// that. `scattered` is the part that the eye gets of what arrives; `looks_around` says whether the path goes on
+    /// to look for light by chance, which may be the same light.
     #[inline]
     pub fn gather(
         &self,
         path: &Path,
         point: &Point<'_>,
         sequence: &Sequence,
-        scattered: &Scattered,
+        (scattered, looks_around): (&Scattered, bool),
         sum: &mut Vec3,
         rays: &mut Vec<LightRay>,
     ) {
@@ -60,8 +63,7 @@ impl Direct<'_> {
             add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
         }
         if let Some(emitters) = &self.lights.emitters {
-            let light =
-                emitters.sample_for(
+            let light = emitters.sample_for(
                 origin,
                 path.random(sequence, Use::Light),
                 path.random(sequence, Use::LightPlace),
@@ -72,7 +74,9 @@ impl Direct<'_> {
             let cosines = point.normal.dot(toward).max(0.0) * light.normal.dot(toward).abs();
             // A point on the light itself, or on its back's edge, gets nothing from here.
             if cosines > 0.0 && point.face.dot(toward) > 0.0 && distance > 0.0 && light.pdf_area > 0.0 {
-                let thrown = matt * FRAC_1_PI + gloss * self.lobe(point, toward);
+                let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
+                let share = share(looks_around, by_angle, point.normal.dot(toward));
+                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, toward);
                 let light = thrown * light.radiance * (cosines / (distance * distance * light.pdf_area));
                 // Short of the light, which would hide itself.
                 let ray = Ray::segment(origin, way, 0.0, 1.0 - 1e-4);
@@ -83,7 +87,8 @@ impl Direct<'_> {
             let sample = environment.sample(path.random(sequence, Use::Environment));
             let cosine = point.normal.dot(sample.direction);
             if cosine > 0.0 && point.face.dot(sample.direction) > 0.0 && sample.pdf > 0.0 {
-                let thrown = matt * FRAC_1_PI + gloss * self.lobe(point, sample.direction);
+                let share = share(looks_around, sample.pdf, cosine);
+                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, sample.direction);
                 let light = thrown * sample.radiance * (cosine / sample.pdf);
                 add(Effect::Environment, Ray::new(origin, sample.direction), light);
             }
@@ -102,6 +107,19 @@ impl Direct<'_> {
         } else {
             *sum += matt * ambient.irradiance(point.normal);
         }
+    }
+
+    /// The density by solid angle with which a light would have been looked for that a path has met.
+    pub fn density_of(&self, path: &Path, point: &Point<'_>) -> f32 {
+        let Some(emitters) = &self.lights.emitters else { return 0.0 };
+        let by_area = emitters.pdf_area_for(path.from, point.primitive);
+        let place = path.ray.origin - point.toward * point.distance;
+        by_solid_angle(by_area, place - path.from, point.face)
+    }
+
+    /// The same for the light from around.
+    pub fn density_around(&self, direction: Vec3) -> f32 {
+        self.lights.environment.as_ref().map_or(0.0, |environment| environment.pdf(direction))
     }
 
     /// Light of the key light. Its irradiance is what a white surface that faces it throws back: that divided by
@@ -127,4 +145,11 @@ impl Direct<'_> {
         let [wo, wi] = [point.toward, toward].map(|v| basis.to_local(v));
         ggx::evaluate(wo, wi, point.roughness.max(SHARPEST), |_| Vec3::ONE).x
     }
+}
+
+/// How much light counts that was looked for on purpose, where a path may meet it by chance as well: see
+/// [`Path::share`].
+#[inline]
+fn share(looks_around: bool, on_purpose: f32, cosine: f32) -> f32 {
+    if looks_around { power_heuristic(on_purpose, cosine_density(cosine)) } else { 1.0 }
 }

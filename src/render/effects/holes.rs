@@ -52,7 +52,7 @@ impl<S: Surface> Sieve for Holes<'_, S> {
 }
 
 /// Whether a material leaves holes: it is cut out, and not everything of it is there.
-fn has_holes(material: &Material, textures: &Textures) -> bool {
+pub fn has_holes(material: &Material, textures: &Textures) -> bool {
     let Some(cutoff) = material.cutoff else { return false };
     match &material.maps.opacity {
         Some(map) => !textures.is_opaque(map) || material.opacity < cutoff,

@@ -33,5 +33,5 @@ mod wave;
 pub use appearance::{Appearance, Limits};
 pub use cost::EffectCosts;
 pub(super) use cost::Tallies;
-pub use setup::{FINE, MANY, Staged, Wishes};
+pub use setup::{FINE, MANY, Staged, Wishes, memory_beside};
 pub(super) use task::{EffectScratch, EffectTask};

@@ -1,7 +1,7 @@
 //! A ray on its way from the eye, with what it has met so far.
 
 use crate::geometry::Ray;
-use crate::render::scatter::{Media, Sequence};
+use crate::render::scatter::{Media, Sequence, power_heuristic};
 use crate::scene::effects::Effect;
 use crate::scene::texture::Cone;
 use glam::Vec3;
@@ -39,12 +39,6 @@ impl Way {
             Self::Diffuse => Some(Effect::Interreflection),
         }
     }
-
-    /// Whether lights that such a ray meets are to be counted: those that a matt surface sees were looked for
-    /// already.
-    pub const fn sees_lights(self) -> bool {
-        !matches!(self, Self::Diffuse)
-    }
 }
 
 /// A ray, and what becomes of the light that it finds.
@@ -58,8 +52,11 @@ pub struct Path {
     pub depth: u16,
     /// What made it.
     pub way: Way,
-    /// Whether lights that it meets count.
-    pub sees_lights: bool,
+    /// The density by solid angle with which its direction was chosen, if the light from there was looked for in
+    /// other ways too; 0 if this was the only way.
+    pub density: f32,
+    /// Where its direction was chosen: before it went through what is not quite there.
+    pub from: Vec3,
     /// Which of the many paths of its pixel's sample it is: for random numbers of its own.
     pub branch: u32,
     /// The part of the light that arrives.
@@ -87,6 +84,14 @@ pub enum Use {
 const USES: u32 = 8;
 
 impl Path {
+    /// How much light counts that this path met by chance, where those who looked for it on purpose chose its
+    /// direction with the density `on_purpose`: both together count for one (Veach & Guibas, "Optimally combining
+    /// sampling techniques for Monte Carlo rendering", 1995).
+    #[inline]
+    pub fn share(&self, on_purpose: impl FnOnce() -> f32) -> f32 {
+        if self.density > 0.0 { power_heuristic(self.density, on_purpose()) } else { 1.0 }
+    }
+
     /// Two random numbers, 0 to less than 1.
     #[inline]
     pub fn random(&self, sequence: &Sequence, what: Use) -> [f32; 2] {

@@ -24,6 +24,7 @@ pub struct Point<'a> {
     /// The material's number.
     pub number: u32,
     /// The triangle.
+    pub primitive: u32,
     corners: [Vec3; 3],
     normals: [Normal; 3],
     u: f32,
@@ -70,6 +71,7 @@ impl<'a> Resolver<'a> {
         let mut point = Point {
             material,
             number,
+            primitive: hit.primitive,
             corners,
             normals: attributes.normals,
             u: hit.u,

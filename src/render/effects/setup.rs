@@ -1,8 +1,10 @@
 //! From a scene to what is to be shown of it.
 
 use super::appearance::{Appearance, Limits};
-use crate::mesh::{Map, Material};
-use crate::scene::effects::{Analysis, Around, Effect, EffectSet, Request};
+use super::holes::has_holes;
+use super::task::EffectScratch;
+use crate::mesh::{Image, Map, Material};
+use crate::scene::effects::{Analysis, Around, Effect, EffectSet, Request, calls_for};
 use crate::scene::texture::{Problem, Textures};
 use crate::scene::{Camera, Emitters, Environment, Light, Lighting, Lights, Surface};
 use crate::traverse::Accel;
@@ -61,7 +63,11 @@ impl Staged {
         };
         let emitters =
             if is_off(Effect::SoftShadows) || is_off(Effect::Emission) { None } else { emitters(surface) };
-        let lights = Lights::for_view(camera, accel, &lighting, emitters, environment);
+        let lets_pass = |primitive| {
+            let material = surface.materials().get(surface.material(primitive) as usize);
+            material.is_some_and(|material| material.transmission != Vec3::ZERO)
+        };
+        let lights = Lights::for_view(camera, accel, &lets_pass, &lighting, emitters, environment);
 
         let key_light = lights.key.map(|light| match light {
             Light::Sun { .. } => "key light: a sun",
@@ -85,14 +91,36 @@ impl Staged {
         let error = if set.has(Effect::Antialiasing) { error } else { 0.0 };
         let samples = samples.unwrap_or(if is_sampled || error > 0.0 { MANY } else { 1 });
 
-        if PLAIN.or(set) == PLAIN && lights.ambient.is_some() {
-            return Self { analysis, appearance: None, samples, problems: Vec::new() };
-        }
         let (textures, problems) = Textures::open(surface.images(), maps(surface, set));
+        // Files say that pictures may cut holes; whether they do is known now.
+        let set = analysis.without_false_holes(surface, |material| has_holes(material, &textures));
+        if PLAIN.or(set) == PLAIN && lights.ambient.is_some() {
+            return Self { analysis, appearance: None, samples, problems };
+        }
         let limits = Limits { bounces, error };
         let appearance = Some(Appearance { set, lights, textures, limits });
         Self { analysis, appearance, samples, problems }
     }
+}
+
+/// The memory that a picture may need beside what its scene and its pixels take: the pictures that are opened for it,
+/// and what each of `workers` keeps. They are opened to know.
+pub fn memory_beside(
+    materials: &[Material],
+    uses: &[u64],
+    images: &[Image],
+    request: &Request,
+    workers: usize,
+) -> usize {
+    let may_run = Effect::ALL.iter().filter(|&&effect| request.of(effect) != Some(false));
+    let set = may_run.fold(EffectSet::NONE, |set, &effect| set.with(effect, true));
+    let used = || materials.iter().zip(uses).filter(|(_, uses)| **uses > 0).map(|(material, _)| material);
+    let is_forced = set.iter().any(|effect| request.of(effect) == Some(true));
+    if !is_forced && !used().any(|material| set.iter().any(|effect| calls_for(material, effect))) {
+        return 0;
+    }
+    let (textures, _) = Textures::open(images, used().flat_map(|material| needed(material, set)));
+    textures.bytes() + workers * EffectScratch::BYTES
 }
 
 /// The surfaces that give off light.
@@ -135,7 +163,7 @@ fn needed(material: &Material, set: EffectSet) -> Vec<&Map> {
 mod tests {
     use super::*;
     use crate::kdtree::BuildParams;
-    use crate::mesh::{Channel, Colors, Image, ImageSource, Mesh};
+    use crate::mesh::{Channel, Colors, ImageSource, Mesh};
 
     fn scene(materials: Vec<Material>) -> Mesh {
         let triangles: Vec<[u32; 3]> = materials.iter().map(|_| [0, 1, 2]).collect();

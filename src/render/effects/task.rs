@@ -22,6 +22,8 @@ pub struct EffectTask<'a, S> {
     /// The standard error of a pixel's brightness, as displays show it from 0 to 1, at which it has samples enough;
     /// 0 takes all of them.
     pub error: f32,
+    /// Counts the rays of this effect instead of adding up light.
+    pub counted: Option<Effect>,
 }
 
 /// Samples that a pixel gets before its error is guessed: fewer would agree by chance too often.
@@ -48,9 +50,12 @@ pub struct EffectScratch {
 }
 
 impl EffectScratch {
+    /// About what it takes up: some thousands of paths at once.
+    pub const BYTES: usize = 2 << 20;
+
     /// Empty, with what has been learnt before about kernels.
-    pub fn new(learnt: Dispatch) -> Self {
-        Self { waves: Waves::new(learnt), ..Self::default() }
+    pub fn new(learnt: Dispatch, counts: bool) -> Self {
+        Self { waves: Waves::new(learnt, counts), ..Self::default() }
     }
 }
 
@@ -83,9 +88,13 @@ impl<S: Surface> EffectTask<'_, S> {
         for sample in 0..self.samples {
             self.camera_paths(scratch, sample, &in_picture);
             scratch.sample.fill(Vec3::ZERO);
+            scratch.waves.counted.clear();
             let EffectScratch { waves, paths, sample: light, seen, .. } = scratch;
             let seen = (sample == 0).then_some(seen);
             self.world.run(waves, paths, |pixel| Sequence::of(in_picture(pixel), sample), light, seen);
+            if let Some(counted) = self.counted {
+                scratch.show_counts(counted);
+            }
             scratch.take(self.error, sample + 1);
             if scratch.wanting.is_empty() {
                 break;
@@ -143,6 +152,16 @@ impl EffectScratch {
         self.wanting.clear();
     }
 
+    /// Has the sample at hand be the number of an effect's rays.
+    fn show_counts(&mut self, counted: Effect) {
+        self.sample.fill(Vec3::ZERO);
+        for &(pixel, effect) in &self.waves.counted {
+            if effect == counted {
+                self.sample[usize::from(pixel)] += Vec3::ONE;
+            }
+        }
+    }
+
     /// Adds the sample at hand, of so many that there are now, and lets pixels go whose error is small enough.
     fn take(&mut self, error: f32, count: u32) {
         for &pixel in &self.wanting {
@@ -191,7 +210,8 @@ impl Path {
             pixel: 0,
             depth: 0,
             way: Way::Camera,
-            sees_lights: true,
+            density: 0.0,
+            from: ray.origin,
             branch: 0,
             weight: Vec3::ONE,
             cone: Cone::new(0.0),

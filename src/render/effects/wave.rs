@@ -49,12 +49,16 @@ pub struct Waves {
     light_rays: Vec<Ray>,
     occluded: Vec<bool>,
     asked: Vec<usize>,
+    /// The pixels and effects of all rays, if they are to be counted.
+    pub counted: Vec<(u16, Effect)>,
+    /// Whether they are.
+    counts: bool,
 }
 
 impl Waves {
-    /// Empty, with what has been learnt before about kernels.
-    pub fn new(learnt: Dispatch) -> Self {
-        Self { tracer: Tracer::new(learnt), ..Self::default() }
+    /// Empty, with what has been learnt before about kernels. With `counts`, rays are counted one by one.
+    pub fn new(learnt: Dispatch, counts: bool) -> Self {
+        Self { tracer: Tracer::new(learnt), counts, ..Self::default() }
     }
 }
 
@@ -129,6 +133,9 @@ impl<S: Surface> World<'_, S> {
         waves.hits.resize(paths.len(), Hit::MISS);
         waves.tracer.intersect(self.accel, self.kernel, way, &waves.rays, &mut waves.hits);
         let (rays, time) = (paths.len() as u64, start.elapsed());
+        if let (true, Some(effect)) = (waves.counts, way.effect()) {
+            waves.counted.extend(paths.iter().map(|path| (path.pixel, effect)));
+        }
         match way.effect() {
             Some(effect) => waves.tallies.add(effect, rays, time),
             None => waves.camera += Tally { rays, time },
@@ -142,6 +149,9 @@ impl<S: Surface> World<'_, S> {
                 waves.hits[i].is_hit() && !holes.is_there_for(&surfaces, primitive, u, v)
             }));
             drop(surfaces);
+            if waves.counts {
+                waves.counted.extend(waves.asked.iter().map(|&i| (paths[i].pixel, Effect::CutOuts)));
+            }
             let Waves { tracer, rays, hits, asked, .. } = waves;
             tracer.intersect_sifted(self.accel, holes, rays, hits, asked);
             waves.tallies.add(Effect::CutOuts, waves.asked.len() as u64, start.elapsed());
@@ -188,9 +198,7 @@ impl<S: Surface> World<'_, S> {
         for (path, hit) in job.paths.iter().zip(job.hits) {
             let sum = &mut sums[path.pixel as usize];
             if !hit.is_hit() {
-                if path.sees_lights || self.direct.lights.environment.is_none() {
-                    *sum += path.weight * self.behind(path);
-                }
+                *sum += path.weight * self.behind(path);
                 continue;
             }
             let sequence = (job.sequence)(path.pixel);
@@ -205,8 +213,8 @@ impl<S: Surface> World<'_, S> {
                     self.bounce.through(path, &point, &sequence, weight * (1.0 - point.opacity), next);
                     weight *= point.opacity;
                 }
-                if path.sees_lights && self.set.has(Effect::Emission) {
-                    *sum += weight * point.emission;
+                if point.emission != Vec3::ZERO && self.set.has(Effect::Emission) {
+                    *sum += weight * point.emission * path.share(|| self.direct.density_of(path, &point));
                 }
             }
             if point.material.unlit {
@@ -219,9 +227,10 @@ impl<S: Surface> World<'_, S> {
                 Scattered { matt: weight * point.diffuse, ..Scattered::default() }
             };
             if scattered != Scattered::default() {
-                self.direct.gather(path, &point, &sequence, &scattered, sum, lights);
+                let looks_around = RAYS && self.bounce.looks_around(path);
+                self.direct.gather(path, &point, &sequence, (&scattered, looks_around), sum, lights);
             }
-            if RAYS && self.set.has(Effect::Interreflection) {
+            if RAYS && self.bounce.looks_around(path) {
                 self.bounce.diffuse(path, &point, &sequence, scattered.matt, next);
             }
         }
@@ -234,7 +243,10 @@ impl<S: Surface> World<'_, S> {
         match (&self.direct.lights.ambient, path.way) {
             // What falls on matt surfaces from everywhere, not what the sky looks like.
             (Some(ambient), Way::Diffuse) => ambient.irradiance(direction.normalize_or_zero()),
-            _ => self.direct.lights.background(direction),
+            _ => {
+                let share = path.share(|| self.direct.density_around(direction));
+                self.direct.lights.background(direction) * share
+            }
         }
     }
 
@@ -242,6 +254,9 @@ impl<S: Surface> World<'_, S> {
     fn light(&self, waves: &mut Waves, sums: &mut [Vec3]) {
         if waves.lights.is_empty() {
             return;
+        }
+        if waves.counts {
+            waves.counted.extend(waves.lights.iter().map(|light| (light.pixel, light.effect)));
         }
         waves.occluded.clear();
         waves.occluded.resize(waves.lights.len(), false);
@@ -311,7 +326,7 @@ impl<S: Surface> World<'_, S> {
                         occluded[i] = false;
                         return false;
                     }
-                    light.light *= self.passing(&surfaces, &light.ray, &hit);
+                    light.light *= self.passing(&surfaces, light, &hit);
                     light.ray.tnear = hit.t.next_up();
                     light.light.max_element() > 0.0
                 });
@@ -320,18 +335,21 @@ impl<S: Surface> World<'_, S> {
         tallies.add(effect, cast, start.elapsed());
     }
 
-    /// The part of the light that goes straight through a surface. What bends light is taken to let it pass
-    /// unbent: a point of light would never be found behind it otherwise.
-    fn passing(&self, surfaces: &impl Look, ray: &Ray, hit: &Hit) -> Vec3 {
+    /// The part of the light that goes straight through a surface. What bends light is taken to let that of points
+    /// pass unbent, which no path would ever find behind it; other light is found by the paths that are bent.
+    fn passing(&self, surfaces: &impl Look, light: &LightRay, hit: &Hit) -> Vec3 {
         if let Some(holes) = &self.holes
             && !holes.is_there_for(surfaces, hit.primitive, hit.u, hit.v)
         {
             return Vec3::ONE;
         }
-        let path = Path::of_ray(*ray);
+        let path = Path::of_ray(light.ray);
         let point = self.resolver.resolve::<true>(surfaces, &path, hit);
         let material: &Material = point.material;
-        let gone_through = if self.set.has(Effect::Refraction) { material.transmission } else { Vec3::ZERO };
+        let passes =
+            material.ior == 1.0 || matches!(light.effect, Effect::Shadows | Effect::AmbientOcclusion);
+        let gone_through =
+            if passes && self.set.has(Effect::Refraction) { material.transmission } else { Vec3::ZERO };
         Vec3::splat(1.0 - point.opacity) + gone_through * point.opacity
     }
 }

@@ -66,7 +66,7 @@ impl Analysis {
         };
         for &effect in Effect::ALL {
             let called_for_by = match effect {
-                Effect::SmoothNormals if surface.has_attributes() => {
+                Effect::SmoothNormals if surface.has_normals() => {
                     vec!["normals of the model's vertices".into()]
                 }
                 Effect::Shadows => around.key_light.map(|light| vec![light.into()]).unwrap_or_default(),
@@ -90,6 +90,27 @@ impl Analysis {
             effects.push(Call { name: effect, on, called_for_by, asked });
         }
         Self { effects }
+    }
+
+    /// Leaves materials out of those that call for holes which have none, now that their pictures are known. The effects
+    /// that run then.
+    pub(crate) fn without_false_holes(
+        &mut self,
+        surface: &impl Surface,
+        has_holes: impl Fn(&Material) -> bool,
+    ) -> EffectSet {
+        let call = &mut self.effects[Effect::CutOuts as usize];
+        if call.on && call.asked.is_none() {
+            let uses = surface.uses();
+            let used = surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0);
+            let callers: Vec<&Material> = used
+                .map(|(material, _)| material)
+                .filter(|material| calls_for(material, Effect::CutOuts) && has_holes(material))
+                .collect();
+            call.called_for_by = named(&callers);
+            call.on = !callers.is_empty();
+        }
+        self.set()
     }
 
     /// The effects that run.

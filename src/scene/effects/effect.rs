@@ -80,6 +80,25 @@ impl Effect {
     }
 }
 
+impl Effect {
+    /// Whether it casts rays of its own.
+    pub const fn casts_rays(self) -> bool {
+        matches!(
+            self,
+            Self::CutOuts
+                | Self::Transparency
+                | Self::Shadows
+                | Self::SoftShadows
+                | Self::Reflection
+                | Self::Glossy
+                | Self::Refraction
+                | Self::AmbientOcclusion
+                | Self::Interreflection
+                | Self::Environment
+        )
+    }
+}
+
 impl fmt::Display for Effect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())

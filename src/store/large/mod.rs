@@ -146,6 +146,7 @@ pub fn build(
             uses: surfaces.uses,
             // No file that is read piece by piece has any.
             attributes: false,
+            normals: false,
             images: Vec::new(),
         };
         let meta = serde_json::to_vec_pretty(&meta).expect("it is plain data");
