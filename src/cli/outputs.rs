@@ -7,11 +7,17 @@ use crate::render::{Aovs, Frame};
 use std::path::{Path, PathBuf};
 
 /// Which pictures go where.
+/// The greatest change of exposure that makes sense.
+const MAX_STOPS: f32 = 40.0;
+
 #[derive(Clone, Debug, clap::Args)]
 pub struct Outputs {
     /// The picture: .png (8-bit sRGB), .exr or .pfm (32-bit float, linear)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Show a .png so many stops brighter: 1 doubles the light, -1 halves it
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
     /// Write the distance from the eye: .exr or .pfm for its values, .png to look at
     #[arg(long, value_name = "FILE")]
     depth: Option<PathBuf>,
@@ -34,6 +40,11 @@ impl Outputs {
     /// Finds out before any work whether all can be written: endings are known, folders writable,
     /// and no two of them (nor the scene, nor the report) are the same file.
     pub fn check(&self, frames: Option<u32>, others: &[&Path]) -> Result<()> {
+        if self.exposure.is_nan() || self.exposure.abs() > MAX_STOPS {
+            let message =
+                format!("{} is not a number of stops from -{MAX_STOPS} to {MAX_STOPS}", self.exposure);
+            return Err(Error::option("--exposure", message));
+        }
         let pictures: Vec<&Path> = [Some(&self.output), self.depth.as_ref(), self.normals.as_ref()]
             .into_iter()
             .flatten()
@@ -54,7 +65,7 @@ impl Outputs {
     /// Writes the picture that a frame was at first, and returns its path.
     pub fn write_first(&self, frame: &Frame, number: u32, frames: Option<u32>) -> Result<PathBuf> {
         let output = first_path(&frame_path(&self.output, number, frames));
-        image::write_color(&output, frame.size, &frame.color)?;
+        image::write_exposed(&output, frame.size, &frame.color, self.exposure.exp2())?;
         Ok(output)
     }
 
@@ -62,7 +73,7 @@ impl Outputs {
     pub fn write(&self, frame: &Frame, number: u32, frames: Option<u32>) -> Result<PathBuf> {
         let path = |picture: &Path| frame_path(picture, number, frames);
         let output = path(&self.output);
-        image::write_color(&output, frame.size, &frame.color)?;
+        image::write_exposed(&output, frame.size, &frame.color, self.exposure.exp2())?;
         if let (Some(file), Some(depth)) = (&self.depth, &frame.depth) {
             image::write_depth(&path(file), frame.size, depth)?;
         }

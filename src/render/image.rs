@@ -59,7 +59,15 @@ impl Format {
 /// # Panics
 /// If the number of pixels is not that of `size`. So do the others.
 pub fn write_color(path: &Path, size: Size, pixels: &[[f32; 3]]) -> Result<()> {
-    write_rgb(path, size, pixels, |c| c.map(linear_to_srgb))
+    write_exposed(path, size, pixels, 1.0)
+}
+
+/// The same; of a .png, `gain` times as bright. The others hold the light as it is.
+///
+/// # Errors
+/// As [`write_color`].
+pub fn write_exposed(path: &Path, size: Size, pixels: &[[f32; 3]], gain: f32) -> Result<()> {
+    write_rgb(path, size, pixels, |c| c.map(|c| linear_to_srgb(c * gain)))
 }
 
 /// Writes unit normals.

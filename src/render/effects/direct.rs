@@ -25,6 +25,10 @@ pub struct LightRay {
 /// The smoothest surface on which lights make highlights: that of a light without extent is invisible on a mirror.
 const SHARPEST: f32 = 0.03;
 
+/// The same for lights that have one, of which one point is looked at a time: a sharper highlight would be a few bright
+/// dots.
+const SHARPEST_OF_WIDE: f32 = 0.2;
+
 /// What lights a frame.
 pub struct Direct<'a> {
     pub lights: &'a Lights,
@@ -76,7 +80,7 @@ impl Direct<'_> {
             if cosines > 0.0 && point.face.dot(toward) > 0.0 && distance > 0.0 && light.pdf_area > 0.0 {
                 let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
                 let share = share(looks_around, by_angle, point.normal.dot(toward));
-                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, toward);
+                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, toward, SHARPEST_OF_WIDE);
                 let light = thrown * light.radiance * (cosines / (distance * distance * light.pdf_area));
                 // Short of the light, which would hide itself.
                 let ray = Ray::segment(origin, way, 0.0, 1.0 - 1e-4);
@@ -88,7 +92,8 @@ impl Direct<'_> {
             let cosine = point.normal.dot(sample.direction);
             if cosine > 0.0 && point.face.dot(sample.direction) > 0.0 && sample.pdf > 0.0 {
                 let share = share(looks_around, sample.pdf, cosine);
-                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, sample.direction);
+                let thrown =
+                    matt * (FRAC_1_PI * share) + gloss * self.lobe(point, sample.direction, SHARPEST_OF_WIDE);
                 let light = thrown * sample.radiance * (cosine / sample.pdf);
                 add(Effect::Environment, Ray::new(origin, sample.direction), light);
             }
@@ -130,20 +135,22 @@ impl Direct<'_> {
         if cosine <= 0.0 || point.face.dot(way.toward) <= 0.0 {
             return Vec3::ZERO;
         }
-        (scattered.matt + scattered.points * (PI * self.lobe(point, way.toward))) * way.irradiance * cosine
+        (scattered.matt + scattered.points * (PI * self.lobe(point, way.toward, SHARPEST)))
+            * way.irradiance
+            * cosine
     }
 
     /// How much of the light from `toward` a surface throws to the eye near the mirror's direction, for each unit of
     /// its specular reflectance.
     #[inline]
-    fn lobe(&self, point: &Point<'_>, toward: Vec3) -> f32 {
+    fn lobe(&self, point: &Point<'_>, toward: Vec3, sharpest: f32) -> f32 {
         const LOBES: EffectSet = EffectSet::of(&[Effect::Highlights, Effect::Glossy]);
         if !self.set.has_any(LOBES) || point.specular == Vec3::ZERO {
             return 0.0;
         }
         let basis = Basis::of(point.normal);
         let [wo, wi] = [point.toward, toward].map(|v| basis.to_local(v));
-        ggx::evaluate(wo, wi, point.roughness.max(SHARPEST), |_| Vec3::ONE).x
+        ggx::evaluate(wo, wi, point.roughness.max(sharpest), |_| Vec3::ONE).x
     }
 }
 

@@ -55,6 +55,8 @@ pub struct Path {
     /// The density by solid angle with which its direction was chosen, if the light from there was looked for in
     /// other ways too; 0 if this was the only way.
     pub density: f32,
+    /// Whether it has been thrown on by a matt surface.
+    pub is_indirect: bool,
     /// Where its direction was chosen: before it went through what is not quite there.
     pub from: Vec3,
     /// Which of the many paths of its pixel's sample it is: for random numbers of its own.
@@ -66,6 +68,9 @@ pub struct Path {
     /// What it is in.
     pub media: Media,
 }
+
+/// The most that a path adds to a pixel if it comes from a matt surface by way of mirrors or glass; white is 1.
+const BRIGHTEST: f32 = 4.0;
 
 /// What random numbers are for. Each path has its own for each use.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +89,19 @@ pub enum Use {
 const USES: u32 = 8;
 
 impl Path {
+    /// The light that arrives of what the path has met. What a matt surface gets by way of mirrors and glass comes along
+    /// few paths, and much of it along each: single ones would stay as bright dots in the picture, so that they
+    /// count for [`BRIGHTEST`] at most.
+    #[inline]
+    pub fn arriving(&self, light: Vec3) -> Vec3 {
+        let brightest = light.max_element();
+        if self.is_indirect && self.density == 0.0 && brightest > BRIGHTEST {
+            light * (BRIGHTEST / brightest)
+        } else {
+            light
+        }
+    }
+
     /// How much light counts that this path met by chance, where those who looked for it on purpose chose its
     /// direction with the density `on_purpose`: both together count for one (Veach & Guibas, "Optimally combining
     /// sampling techniques for Monte Carlo rendering", 1995).

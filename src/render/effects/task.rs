@@ -27,7 +27,7 @@ pub struct EffectTask<'a, S> {
 }
 
 /// Samples that a pixel gets before its error is guessed: fewer would agree by chance too often.
-const LEAST: u32 = 8;
+const LEAST: u32 = 16;
 
 /// What a worker keeps from tile to tile.
 #[derive(Debug, Default)]
@@ -211,6 +211,7 @@ impl Path {
             depth: 0,
             way: Way::Camera,
             density: 0.0,
+            is_indirect: false,
             from: ray.origin,
             branch: 0,
             weight: Vec3::ONE,

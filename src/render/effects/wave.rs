@@ -198,7 +198,7 @@ impl<S: Surface> World<'_, S> {
         for (path, hit) in job.paths.iter().zip(job.hits) {
             let sum = &mut sums[path.pixel as usize];
             if !hit.is_hit() {
-                *sum += path.weight * self.behind(path);
+                *sum += path.arriving(path.weight * self.behind(path));
                 continue;
             }
             let sequence = (job.sequence)(path.pixel);
@@ -214,7 +214,8 @@ impl<S: Surface> World<'_, S> {
                     weight *= point.opacity;
                 }
                 if point.emission != Vec3::ZERO && self.set.has(Effect::Emission) {
-                    *sum += weight * point.emission * path.share(|| self.direct.density_of(path, &point));
+                    let share = path.share(|| self.direct.density_of(path, &point));
+                    *sum += path.arriving(weight * point.emission * share);
                 }
             }
             if point.material.unlit {
