@@ -58,6 +58,18 @@ pub struct Args {
     /// Samples per pixel of the reference picture [default: 16 times the most of --samples]
     #[arg(long, value_name = "N")]
     reference_samples: Option<u32>,
+    /// What pictures show: as in render
+    #[arg(
+        long,
+        value_name = "auto|none|LIST|+NAME|-NAME",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    effects: String,
+    /// Bounces of the pictures: surfaces that light may have met before the one that is seen, where effects ask for any;
+    /// the reference picture has the most of them
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "8")]
+    bounces: Vec<u32>,
     /// Rays of each kind whose answers are held against exact arithmetic; the others are timed only
     #[arg(long, value_name = "N", default_value_t = 1 << 16)]
     oracle_rays: usize,
@@ -140,6 +152,8 @@ fn options(args: &Args) -> Result<Options> {
         size: args.size.parse()?,
         samples,
         reference_samples: args.reference_samples.unwrap_or(most.saturating_mul(REFERENCE_FACTOR)),
+        request: args.effects.parse()?,
+        bounces: args.bounces.clone(),
         oracle_rays: args.oracle_rays,
         within,
         seed: args.seed,

@@ -6,10 +6,10 @@ use crate::render::image::{self, Format};
 use crate::render::{Aovs, Frame};
 use std::path::{Path, PathBuf};
 
-/// Which pictures go where.
 /// The greatest change of exposure that makes sense.
 const MAX_STOPS: f32 = 40.0;
 
+/// Which pictures go where.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Outputs {
     /// The picture: .png (8-bit sRGB), .exr or .pfm (32-bit float, linear)

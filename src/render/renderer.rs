@@ -1,7 +1,7 @@
 //! Cameras to frames.
 
 use super::bounded::{First, FirstStats, StandIn, StandInCost};
-use super::effects::{Appearance, EffectCosts, EffectScratch, EffectTask, Tallies};
+use super::effects::{Appearance, EffectCosts, EffectScratch, EffectTask, Limits, Tallies};
 use super::frame::{Frame, TilePixels, TiledFrame};
 use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
@@ -34,6 +34,8 @@ pub struct Renderer<'a, S = Mesh> {
     stand_in: StandInCost,
     /// What there is to show beside matt surfaces, if anything.
     appearance: Option<&'a Appearance>,
+    /// How far its accuracy goes.
+    limits: Limits,
 }
 
 /// A frame that is to be drawn.
@@ -63,7 +65,17 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
         let learnt = DispatchPool::default();
         let (frames, stand_in) = (AtomicUsize::new(0), StandInCost::default());
-        Ok(Self { accel, surface, settings, tiles, learnt, frames, stand_in, appearance: None })
+        Ok(Self {
+            accel,
+            surface,
+            settings,
+            tiles,
+            learnt,
+            frames,
+            stand_in,
+            appearance: None,
+            limits: Limits::default(),
+        })
     }
 
     /// The same, with effects. Light then comes from `appearance`, not from what frames are given.
@@ -72,7 +84,16 @@ impl<'a, S: Surface> Renderer<'a, S> {
     /// As [`Limits::check`](super::Limits::check).
     pub fn with_appearance(self, appearance: &'a Appearance) -> Result<Self> {
         appearance.limits.check()?;
-        Ok(Self { appearance: Some(appearance), ..self })
+        Ok(Self { appearance: Some(appearance), limits: appearance.limits, ..self })
+    }
+
+    /// The same with other limits than the appearance has.
+    ///
+    /// # Errors
+    /// As [`Limits::check`](super::Limits::check).
+    pub fn with_limits(self, limits: Limits) -> Result<Self> {
+        limits.check()?;
+        Ok(Self { limits, ..self })
     }
 
     /// The settings.
@@ -230,10 +251,10 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let start = Instant::now();
         let RenderSettings { size, samples, aovs, ref tuning, .. } = self.settings;
         let task = EffectTask {
-            world: appearance.world(self.accel, self.surface, tuning.packet),
+            world: appearance.world(self.accel, self.surface, tuning.packet, self.limits),
             view: wanted.camera.view(size.width, size.height),
             samples,
-            error: appearance.limits.error,
+            error: self.limits.error,
             counted,
         };
         if let Some(cached) = self.accel.cached() {

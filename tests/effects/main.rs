@@ -1,5 +1,6 @@
 //! Pictures with effects: each against what theory says of it, all of them against changes of the machine's part.
 
+mod command;
 mod cut_outs;
 mod invariance;
 mod physics;

@@ -68,8 +68,9 @@ impl Appearance {
         accel: &'a Accel,
         surface: &'a S,
         kernel: Kernel,
+        limits: Limits,
     ) -> World<'a, S> {
-        let Self { set, ref lights, ref textures, limits } = *self;
+        let Self { set, ref lights, ref textures, .. } = *self;
         let bounds = accel.bounds();
         let diagonal = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length() as f32;
         let calls = |material| {

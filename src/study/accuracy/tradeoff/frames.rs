@@ -7,7 +7,7 @@ use super::report::{FrameRow, ReferencePicture};
 use crate::error::Result;
 use crate::geometry::Accuracy;
 use crate::mesh::Mesh;
-use crate::render::Renderer;
+use crate::render::{Appearance, Limits, Renderer};
 use crate::scene::{Camera, Lighting};
 use crate::study::bench::Pace;
 use crate::traverse::Accel;
@@ -26,6 +26,8 @@ pub struct View<'a> {
     pub camera: &'a Camera,
     /// The light, the same for every mode.
     pub lighting: &'a Lighting,
+    /// The effects that the scene calls for, if any.
+    pub appearance: Option<&'a Appearance>,
 }
 
 /// What can be chosen of a picture's accuracy.
@@ -35,12 +37,16 @@ pub struct Setting {
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
+    /// Surfaces that light may have met before the one that is seen; `None` where no effect asks for it.
+    pub bounces: Option<u32>,
 }
 
 impl Setting {
     /// What `raypack render` does unless told otherwise.
     pub fn is_default(self) -> bool {
-        self == Self { accuracy: Accuracy::default(), samples: 1 }
+        self.accuracy == Accuracy::default()
+            && self.samples == 1
+            && self.bounces.is_none_or(|bounces| bounces == Limits::default().bounces)
     }
 }
 
@@ -81,19 +87,30 @@ pub fn race(
     let samples = options.reference_samples;
     progress(&format!("rendering the reference picture, exact, {samples} samples per pixel"));
     let start = Instant::now();
-    let renderer = Renderer::new(accel(Accuracy::Exact), view.mesh, options.settings(samples))?;
+    let bounces = view.appearance.and(options.bounces.iter().max().copied());
+    let setting = Setting { accuracy: Accuracy::Exact, samples, bounces };
+    let renderer = renderer_of(&setting, accel(Accuracy::Exact), view, options)?;
     let judge = Judge::new(renderer.frame(view.camera, view.lighting).0);
     let seconds = start.elapsed().as_secs_f64();
-    let reference = ReferencePicture { accuracy: Accuracy::Exact, samples, seconds };
+    let reference = ReferencePicture { accuracy: Accuracy::Exact, samples, bounces, seconds };
 
     progress("rendering frames in every mode");
-    let of_samples =
-        |&samples: &u32| Accuracy::ALL.into_iter().map(move |accuracy| Setting { accuracy, samples });
-    let settings: Vec<Setting> = options.samples.iter().flat_map(of_samples).collect();
-    let renderer = |setting: &Setting| {
-        Renderer::new(accel(setting.accuracy), view.mesh, options.settings(setting.samples))
+    let bounces: Vec<Option<u32>> = match view.appearance {
+        Some(_) => options.bounces.iter().copied().map(Some).collect(),
+        None => vec![None],
     };
-    let renderers: Vec<Renderer> = settings.iter().map(renderer).collect::<Result<_>>()?;
+    let settings: Vec<Setting> = options
+        .samples
+        .iter()
+        .flat_map(|&samples| bounces.iter().map(move |&bounces| (samples, bounces)))
+        .flat_map(|(samples, bounces)| {
+            Accuracy::ALL.into_iter().map(move |accuracy| Setting { accuracy, samples, bounces })
+        })
+        .collect();
+    let renderers: Vec<Renderer> = settings
+        .iter()
+        .map(|setting| renderer_of(setting, accel(setting.accuracy), view, options))
+        .collect::<Result<_>>()?;
     let warm: Vec<_> = renderers
         .iter()
         .map(|renderer| {
@@ -118,6 +135,22 @@ pub fn race(
     Ok((reference, rows))
 }
 
+/// What renders in a setting; `accel` has its accuracy.
+fn renderer_of<'a>(
+    setting: &Setting,
+    accel: &'a Accel,
+    view: &View<'a>,
+    options: &Options,
+) -> Result<Renderer<'a>> {
+    let renderer = Renderer::new(accel, view.mesh, options.settings(setting.samples))?;
+    match (view.appearance, setting.bounces) {
+        (Some(appearance), Some(bounces)) => {
+            renderer.with_appearance(appearance)?.with_limits(Limits { bounces, error: 0.0 })
+        }
+        _ => Ok(renderer),
+    }
+}
+
 /// The seconds of every renderer's frames, at least three each.
 fn take_turns(renderers: &[Renderer], view: &View, pace: &Pace) -> Vec<Vec<f64>> {
     let mut seconds = vec![Vec::new(); renderers.len()];
@@ -136,7 +169,7 @@ fn take_turns(renderers: &[Renderer], view: &View, pace: &Pace) -> Vec<Vec<f64>>
 /// Frames of one setting, one after the other as `raypack render` makes them.
 pub fn in_a_row(setting: Setting, view: &View, options: &Options) -> Result<Times> {
     let accel = view.accel.clone().with_accuracy(setting.accuracy);
-    let renderer = Renderer::new(&accel, view.mesh, options.settings(setting.samples))?;
+    let renderer = renderer_of(&setting, &accel, view, options)?;
     renderer.frame(view.camera, view.lighting);
     let [seconds] = <[_; 1]>::try_from(take_turns(&[renderer], view, &options.pace)).expect("one renderer");
     Ok(Times::of(seconds))

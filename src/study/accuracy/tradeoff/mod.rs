@@ -30,7 +30,8 @@ use crate::error::{Error, Result};
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
 use crate::mesh::Mesh;
-use crate::render::{RenderSettings, Size, Tuning};
+use crate::render::{Limits, RenderSettings, Size, Staged, Tuning, Wishes};
+use crate::scene::effects::{Effect, Request};
 use crate::scene::{Camera, Lighting};
 use crate::simd::Isa;
 use crate::study::accuracy::Judged;
@@ -59,6 +60,10 @@ pub struct Options {
     pub samples: Vec<u32>,
     /// Samples per pixel of the reference picture.
     pub reference_samples: u32,
+    /// What to make of the effects that the scene calls for.
+    pub request: Request,
+    /// Bounces of the pictures, of scenes whose effects ask for any; the reference has the most of them.
+    pub bounces: Vec<u32>,
     /// How many rays of each kind are held against the reference at most, evenly chosen.
     pub oracle_rays: usize,
     /// The frame time in seconds to pick a setting for.
@@ -101,6 +106,12 @@ impl Options {
         };
         for &samples in &self.samples {
             RenderSettings { samples, ..self.settings(1) }.check()?;
+        }
+        if self.bounces.is_empty() {
+            return wrong("--bounces", "no number of bounces is named".into());
+        }
+        for &bounces in &self.bounces {
+            Limits { bounces, error: 0.0 }.check()?;
         }
         if !(most..=MAX_REFERENCE_SAMPLES).contains(&self.reference_samples) {
             let message = format!(
@@ -169,7 +180,22 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
     }
 
     let lighting = Lighting::for_view(&camera, &accel);
-    let view = frames::View { accel: &accel, mesh, camera: &camera, lighting: &lighting };
+    let wishes = Wishes {
+        request: options.request,
+        lighting,
+        environment: None,
+        samples: Some(1),
+        bounces: Limits::default().bounces,
+        error: Some(0.0),
+    };
+    let staged = Staged::new(&accel, mesh, &camera, wishes);
+    notes.extend(staged.problems.iter().map(ToString::to_string));
+    let appearance = staged.appearance.as_ref();
+    if appearance.is_some() {
+        let names: Vec<&str> = staged.analysis.set().iter().map(Effect::name).collect();
+        notes.push(format!("pictures show {}", names.join(", ")));
+    }
+    let view = frames::View { accel: &accel, mesh, camera: &camera, lighting: &lighting, appearance };
     let (reference_picture, frames) = frames::race(&view, options, progress)?;
     let within = match options.within {
         Some(budget) => Some(within::pick(budget, &frames, &view, options, progress)?),

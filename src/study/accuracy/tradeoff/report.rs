@@ -133,6 +133,9 @@ pub struct ReferencePicture {
     pub accuracy: Accuracy,
     /// Its samples per pixel.
     pub samples: u32,
+    /// Its bounces, where effects ask for any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounces: Option<u32>,
     /// Seconds that it took.
     pub seconds: f64,
 }
@@ -146,6 +149,9 @@ pub struct FrameRow {
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
+    /// Surfaces that light may have met before the one that is seen, where effects ask for any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounces: Option<u32>,
     /// Whether it is what `raypack render` does unless told otherwise.
     pub default: bool,
     /// Worker threads.
@@ -191,6 +197,9 @@ pub struct Choice {
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
+    /// Bounces, where effects ask for any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounces: Option<u32>,
     /// Milliseconds of a frame in the median.
     pub ms: f64,
     /// The quickest frame.
@@ -257,6 +266,7 @@ impl FrameRow {
             engine: "raypack",
             accuracy: setting.accuracy,
             samples: setting.samples,
+            bounces: setting.bounces,
             default: setting.is_default(),
             threads: stats.threads,
             isa: isa.name().into(),
@@ -272,7 +282,7 @@ impl FrameRow {
     }
 
     pub(super) fn setting(&self) -> Setting {
-        Setting { accuracy: self.accuracy, samples: self.samples }
+        Setting { accuracy: self.accuracy, samples: self.samples, bounces: self.bounces }
     }
 }
 
@@ -282,6 +292,7 @@ impl Choice {
         Self {
             accuracy: row.accuracy,
             samples: row.samples,
+            bounces: row.bounces,
             ms: row.ms,
             ms_low: row.ms_low,
             ms_high: row.ms_high,

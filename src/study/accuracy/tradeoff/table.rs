@@ -121,7 +121,10 @@ impl Report {
         ];
         let line = |row: &FrameRow| {
             vec![
-                row.samples.to_string(),
+                match row.bounces {
+                    Some(bounces) => format!("{}, {bounces} bounces", row.samples),
+                    None => row.samples.to_string(),
+                },
                 row.accuracy.to_string(),
                 marks(row.default, row.pareto),
                 figure(row.ms),
@@ -167,9 +170,10 @@ impl fmt::Display for Choice {
         let plural = if self.samples == 1 { "" } else { "s" };
         write!(
             f,
-            "--accuracy {} --samples {}: {} sample{plural} per pixel, {} ms a frame (median of {}, {} to {}), RMSE {:.6}, SSIMULACRA2 {:.2}",
+            "--accuracy {} --samples {}{}: {} sample{plural} per pixel, {} ms a frame (median of {}, {} to {}), RMSE {:.6}, SSIMULACRA2 {:.2}",
             self.accuracy,
             self.samples,
+            self.bounces.map_or_else(String::new, |bounces| format!(" --bounces {bounces}")),
             self.samples,
             figure(self.ms),
             self.frames,

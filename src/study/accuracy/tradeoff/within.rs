@@ -80,7 +80,14 @@ mod tests {
             let times = Times::of(vec![ms * 1e-3]);
             let error = PictureError { rmse, psnr: None, ssimulacra2: 50.0 };
             let size = Size { width: 8, height: 8 };
-            FrameRow::new(Setting { accuracy, samples }, Isa::Portable, size, &stats, times, error)
+            FrameRow::new(
+                Setting { accuracy, samples, bounces: None },
+                Isa::Portable,
+                size,
+                &stats,
+                times,
+                error,
+            )
         };
         rows.iter().map(row).collect()
     }
@@ -104,13 +111,17 @@ mod tests {
             Ok(Times::of(vec![row.ms * 1e-3 * factor; 3]))
         };
         let within = choose(budget_ms * 1e-3, &rows, &mut measure).expect("measured");
-        let setting = |choice: &Choice| Setting { accuracy: choice.accuracy, samples: choice.samples };
+        let setting = |choice: &Choice| Setting {
+            accuracy: choice.accuracy,
+            samples: choice.samples,
+            bounces: choice.bounces,
+        };
         assert!((within.budget_ms - budget_ms).abs() < 1e-9);
         (within.fits, setting(&within.picked), within.next.as_ref().map(setting))
     }
 
     fn setting(accuracy: Accuracy, samples: u32) -> Setting {
-        Setting { accuracy, samples }
+        Setting { accuracy, samples, bounces: None }
     }
 
     #[test]
