@@ -1,15 +1,18 @@
-//! A picture compared with one that somebody has looked at.
+//! Pictures compared with ones that somebody has looked at.
 //!
-//! The golden picture is `tests/golden/plant.png`. When the look is meant to change, run
-//! `RAYPACK_REFRESH_GOLDEN=1 cargo test --test pictures`, look at the new one, and commit it.
+//! The golden pictures are in `tests/golden`. When the look is meant to change, run
+//! `RAYPACK_REFRESH_GOLDEN=1 cargo test --test pictures`, look at the new ones, and commit them.
 
+use image::RgbImage;
 use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::generate::plant::{self, PlantParams};
-use raypack::render::{RenderSettings, Renderer, Size, image as pictures};
+use raypack::render::{Frame, RenderSettings, Renderer, Size, Staged, Wishes, image as pictures};
+use raypack::scene::effects::Request;
 use raypack::scene::{Camera, Lighting};
+use raypack::study::accuracy::tradeoff::Judge;
 use raypack::traverse::Accel;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const SIZE: Size = Size { width: 240, height: 135 };
 
@@ -29,16 +32,7 @@ fn the_plant_looks_as_it_should() {
     let settings = RenderSettings { samples: 4, ..RenderSettings::new(SIZE) };
     let (frame, _) = Renderer::new(&accel, &mesh, settings).expect("settings").frame(&camera, &lighting);
 
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/plant.png");
-    if std::env::var_os("RAYPACK_REFRESH_GOLDEN").is_some() {
-        pictures::write_color(&golden, SIZE, &frame.color).expect("written");
-        return;
-    }
-    let actual = Path::new(env!("CARGO_TARGET_TMPDIR")).join("plant-differs.png");
-    pictures::write_color(&actual, SIZE, &frame.color).expect("written");
-    let read = |path: &Path| image::open(path).expect("a picture").to_rgb8();
-    let (expected, rendered) = (read(&golden), read(&actual));
-    assert_eq!(expected.dimensions(), rendered.dimensions());
+    let Some([expected, rendered]) = beside_golden("plant", &frame) else { return };
     let different = expected
         .pixels()
         .zip(rendered.pixels())
@@ -46,10 +40,76 @@ fn the_plant_looks_as_it_should() {
         .count();
     assert!(
         different as f64 <= DIFFERENT * SIZE.pixels() as f64,
-        "{different} pixels differ from {}; what was rendered is in {}. If that is as it should be: \
-         RAYPACK_REFRESH_GOLDEN=1 cargo test --test pictures",
-        golden.display(),
-        actual.display(),
+        "{different} pixels differ: {}",
+        advice("plant")
     );
-    std::fs::remove_file(actual).expect("it was written");
+}
+
+/// The least likeness: SSIMULACRA 2 calls 90 and more indistinguishable at a normal distance.
+const LIKENESS: f64 = 90.0;
+
+#[test]
+fn the_gallery_looks_as_it_should() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery");
+    let mesh = raypack::mesh::read(folder.join("gallery.obj")).expect("the repository's own").mesh;
+    let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
+    let camera: Camera = "eye=0,1.9,6.6;at=0,1.5,0;fov=48".parse().expect("a camera");
+    // Not used: the scene has a lamp.
+    let lighting = Lighting::outdoors(Vec3::Y, Vec3::Y);
+    let wishes = Wishes {
+        request: Request::default(),
+        lighting,
+        environment: None,
+        samples: Some(32),
+        bounces: 6,
+        error: None,
+    };
+    let staged = Staged::new(&accel, &mesh, &camera, wishes);
+    assert_eq!(staged.problems, []);
+    let settings = RenderSettings { samples: staged.samples, ..RenderSettings::new(SIZE) };
+    let renderer = Renderer::new(&accel, &mesh, settings).expect("settings");
+    let appearance = staged.appearance.as_ref().expect("it calls for effects");
+    let (frame, _) = renderer.with_appearance(appearance).expect("limits").frame(&camera, &lighting);
+
+    let Some([expected, rendered]) = beside_golden("gallery", &frame) else { return };
+    let likeness = Judge::new(frame_of(&expected)).error(&frame_of(&rendered)).ssimulacra2;
+    assert!(likeness >= LIKENESS, "the likeness is {likeness:.1}: {}", advice("gallery"));
+}
+
+/// A picture as a frame.
+fn frame_of(picture: &RgbImage) -> Frame {
+    let color = picture.pixels().map(|pixel| pixel.0.map(raypack::mesh::srgb_to_linear)).collect();
+    Frame { size: SIZE, color, depth: None, normal: None }
+}
+
+/// The golden picture and a frame, as a display shows both. `None` if the golden one was made anew.
+fn beside_golden(name: &str, frame: &Frame) -> Option<[RgbImage; 2]> {
+    let golden = golden(name);
+    if std::env::var_os("RAYPACK_REFRESH_GOLDEN").is_some() {
+        pictures::write_color(&golden, SIZE, &frame.color).expect("written");
+        return None;
+    }
+    let actual = actual(name);
+    pictures::write_color(&actual, SIZE, &frame.color).expect("written");
+    let read = |path: &Path| image::open(path).expect("a picture").to_rgb8();
+    let both = [read(&golden), read(&actual)];
+    assert_eq!(both[0].dimensions(), both[1].dimensions());
+    Some(both)
+}
+
+fn golden(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"))
+}
+
+fn actual(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-actual.png"))
+}
+
+fn advice(name: &str) -> String {
+    format!(
+        "compare {} with what was rendered, {}. If that is as it should be: \
+         RAYPACK_REFRESH_GOLDEN=1 cargo test --test pictures",
+        golden(name).display(),
+        actual(name).display()
+    )
 }

@@ -23,7 +23,7 @@ mod table;
 mod timing;
 mod within;
 
-pub use picture::PictureError;
+pub use picture::{Judge, PictureError};
 pub use report::{Choice, FrameRow, Header, PerMillion, RayRow, ReferencePicture, Report, Within};
 
 use crate::error::{Error, Result};
