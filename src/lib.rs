@@ -46,7 +46,7 @@
 //! | [`store`] | the `.rpk` scene file: written whole, mapped when it is read |
 //! | [`cache`] | scenes of which a part is in memory: blocks that come from a scene file when they are needed |
 //! | [`traverse`] | the kernels that take rays through a tree |
-//! | [`scene`] | camera, camera paths, lights |
+//! | [`scene`] | camera, camera paths, lights, textures, and the effects that a scene calls for |
 //! | [`render`] | tiles, their scheduler, shading, pictures |
 //! | [`batch`] | rays in bulk on all processors, and NumPy's files of them |
 //! | [`profile`] | every tunable in one file |

@@ -63,7 +63,8 @@ impl Bounce {
         next: &mut Queues,
     ) -> Scattered {
         let material = point.material;
-        if self.set.has(Effect::Refraction) && material.transmission != Vec3::ZERO {
+        const OF_GLASS: EffectSet = EffectSet::of(&[Effect::Refraction, Effect::Reflection]);
+        if material.transmission != Vec3::ZERO && self.set.has_any(OF_GLASS) {
             return self.transparent(path, point, sequence, weight, next);
         }
         let is_smooth = point.roughness < SMOOTH;
@@ -136,11 +137,12 @@ impl Bounce {
             // What Fresnel's equations say of light that comes straight on.
             (_, false) => Vec3::splat(dielectric(1.0, eta)),
         };
-        if self.set.has(Effect::Reflection) || bent.is_none() {
+        let goes_in = self.set.has(Effect::Refraction);
+        if self.set.has(Effect::Reflection) || goes_in && bent.is_none() {
             self.mirror(path, point, sequence, weight * reflected, next);
         }
         let entering = weight * (Vec3::ONE - reflected);
-        if let Some(toward) = bent {
+        if let Some(toward) = bent.filter(|_| goes_in) {
             let mut inside = *path;
             if !is_thin {
                 if point.is_front {
