@@ -152,6 +152,19 @@ fn what_glass_absorbs_follows_beer_and_lambert() {
 }
 
 #[test]
+fn what_is_lost_on_the_way_is_lost_before_plain_surfaces_too() {
+    let mut scene = Builder::default();
+    let poster = scene.material(Material { unlit: true, ..Material::matt("poster", Vec3::ONE) });
+    let absorption = Vec3::new(0.2, 0.0, 0.4);
+    let glass = scene.material(Material { absorption, fresnel: false, ..glass(1.000_001) });
+    scene.square(poster, Vec3::new(-50.0, -50.0, -10.0), Vec3::X * 100.0, Vec3::Y * 100.0);
+    // The poster is inside: nothing else is met on the way.
+    scene.cube(glass, Vec3::new(-20.0, -20.0, -12.0), Vec3::new(20.0, 20.0, -5.0));
+    let expected = (-5.0 * absorption.as_dvec3()).to_array().map(|x| x.exp() as f32);
+    assert_light(ahead().mean(&scene.mesh()), Vec3::from(expected), 1e-3);
+}
+
+#[test]
 fn from_under_water_the_surface_is_a_mirror_beyond_the_critical_angle() {
     // The eye is in water and looks up at 60 degrees from the vertical: 48.6 is as far as light comes out.
     let mut scene = Builder::default();

@@ -63,6 +63,9 @@ pub struct Report<'a> {
     /// What those that ran cost, of all frames together, if the plain renderer did not do.
     #[serde(skip_serializing_if = "EffectCosts::is_empty")]
     costs: EffectCosts,
+    /// Seconds of shading beside them, if the plain renderer did not do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shading_seconds: Option<f64>,
     /// Of a scene that is not all in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     cache: Option<CacheReport>,
@@ -85,6 +88,7 @@ impl<'a> Report<'a> {
                 counts.fold((0, 0.0), |(rays, seconds), count| (rays + count.rays, seconds + count.seconds));
             RayCount::of(rays, seconds)
         };
+        let costs = frames.iter().fold(EffectCosts::default(), |costs, shot| costs.and(&shot.stats.costs));
         Self {
             engine: ENGINE,
             scene: scene.report(),
@@ -102,7 +106,8 @@ impl<'a> Report<'a> {
             shadow: sum(|stats| stats.shadow),
             total: sum(|stats| stats.total),
             effects,
-            costs: frames.iter().fold(EffectCosts::default(), |costs, shot| costs.and(&shot.stats.costs)),
+            shading_seconds: (!costs.is_empty()).then(|| costs.shading()),
+            costs,
             cache,
             frames,
         }
@@ -167,6 +172,10 @@ impl Report<'_> {
     /// A line for each effect that ran: its rays, its time, its part of the frame, and what called for it.
     fn describe_effects(&self, lines: &mut Lines) {
         let frame = self.total.seconds;
+        let shading = self.costs.shading();
+        if shading > 0.0 {
+            lines.add("shading", format!("{}, {:.1} %", duration(shading), 100.0 * shading / frame));
+        }
         for (effect, count) in self.costs.iter() {
             let cost = if count.rays > 0 || count.seconds > 0.0 {
                 let share = 100.0 * count.seconds / frame;

@@ -4,12 +4,13 @@ use super::bounce::Bounce;
 use super::direct::Direct;
 use super::holes::Holes;
 use super::point::Resolver;
-use super::wave::World;
+use super::wave::{LetsPass, World};
 use crate::error::{Error, Result};
 use crate::scene::effects::{Effect, EffectSet, calls_for};
 use crate::scene::texture::Textures;
 use crate::scene::{Lights, Surface};
 use crate::traverse::{Accel, Kernel};
+use glam::Vec3;
 
 /// The effects of a picture, and what they need beside the surfaces.
 #[derive(Debug)]
@@ -93,8 +94,21 @@ impl Appearance {
             bounce: Bounce { set, limit: limits.bounces },
             holes,
             set,
+            lets_pass: lets_pass(surface, set),
         }
     }
+}
+
+/// What light goes straight through some surface that triangles have.
+fn lets_pass(surface: &impl Surface, set: EffectSet) -> LetsPass {
+    let uses = surface.uses();
+    let used = surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0);
+    used.fold(LetsPass::default(), |lets_pass, (material, _)| {
+        let is_thin = set.has(Effect::Transparency) && calls_for(material, Effect::Transparency)
+            || set.has(Effect::Refraction) && material.transmission != Vec3::ZERO && material.ior == 1.0;
+        let bends = set.has(Effect::Refraction) && material.transmission != Vec3::ZERO;
+        LetsPass { points: lets_pass.points || is_thin || bends, wide: lets_pass.wide || is_thin }
+    })
 }
 
 /// How far surfaces may be that take light from everywhere away, in diagonals of the scene.

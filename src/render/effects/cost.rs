@@ -11,19 +11,23 @@ const EFFECTS: usize = Effect::ALL.len();
 
 /// What a worker did for each effect.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Tallies([Tally; EFFECTS]);
+pub struct Tallies {
+    by_effect: [Tally; EFFECTS],
+    /// Time in which what rays hit was shaded.
+    pub shading: Duration,
+}
 
 impl Index<Effect> for Tallies {
     type Output = Tally;
 
     fn index(&self, effect: Effect) -> &Tally {
-        &self.0[effect as usize]
+        &self.by_effect[effect as usize]
     }
 }
 
 impl IndexMut<Effect> for Tallies {
     fn index_mut(&mut self, effect: Effect) -> &mut Tally {
-        &mut self.0[effect as usize]
+        &mut self.by_effect[effect as usize]
     }
 }
 
@@ -35,13 +39,14 @@ impl Tallies {
 
     /// All rays.
     pub fn rays(&self) -> u64 {
-        self.0.iter().map(|tally| tally.rays).sum()
+        self.by_effect.iter().map(|tally| tally.rays).sum()
     }
 }
 
 impl AddAssign for Tallies {
     fn add_assign(&mut self, other: Self) {
-        self.0.iter_mut().zip(other.0).for_each(|(tally, other)| *tally += other);
+        self.by_effect.iter_mut().zip(other.by_effect).for_each(|(tally, other)| *tally += other);
+        self.shading += other.shading;
     }
 }
 
@@ -50,11 +55,16 @@ impl AddAssign for Tallies {
 pub struct EffectCosts {
     ran: EffectSet,
     counts: [RayCount; EFFECTS],
+    shading: f64,
 }
 
 impl EffectCosts {
     pub(crate) fn new(ran: EffectSet, tallies: &Tallies, workers: usize) -> Self {
-        Self { ran, counts: tallies.0.map(|tally| RayCount::new(tally, workers)) }
+        Self {
+            ran,
+            counts: tallies.by_effect.map(|tally| RayCount::new(tally, workers)),
+            shading: tallies.shading.as_secs_f64() / workers as f64,
+        }
     }
 
     /// Whether none ran.
@@ -67,10 +77,16 @@ impl EffectCosts {
         self.ran.iter().map(|effect| (effect, self.counts[effect as usize]))
     }
 
+    /// Seconds in which what rays hit was shaded, pictures on surfaces looked up and new rays made, averaged over the
+    /// workers: what effects cost that cast no rays of their own.
+    pub fn shading(&self) -> f64 {
+        self.shading
+    }
+
     /// The same of several frames together.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
-        let mut sum = Self { ran: self.ran.or(other.ran), ..*self };
+        let mut sum = Self { ran: self.ran.or(other.ran), shading: self.shading + other.shading, ..*self };
         for (sum, other) in sum.counts.iter_mut().zip(other.counts) {
             *sum = RayCount::of(sum.rays + other.rays, sum.seconds + other.seconds);
         }

@@ -7,7 +7,6 @@ use crate::geometry::{Hit, Ray};
 use crate::scene::Surface;
 use crate::scene::effects::Effect;
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, RayPacket};
-use std::time::Duration;
 
 /// Rays that go to a kernel at once: sixteen packets of sixteen.
 const LOT: usize = 256;
@@ -19,8 +18,6 @@ pub struct Tracer {
     ways: [Dispatch; Way::ALL.len()],
     /// The same of rays to lights.
     lights: [Dispatch; 4],
-    /// Time in which hits were shaded.
-    pub shading: Duration,
     packets: Packets,
     found: Vec<bool>,
     sifted: Vec<Ray>,

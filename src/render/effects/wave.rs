@@ -33,6 +33,17 @@ pub struct World<'a, S> {
     pub bounce: Bounce,
     pub holes: Option<Holes<'a, S>>,
     pub set: EffectSet,
+    /// Whether anything lets light through, other than by holes.
+    pub lets_pass: LetsPass,
+}
+
+/// What kinds of light some surface lets through on the straight way to where it was looked for from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LetsPass {
+    /// That of points, which bends nowhere: see [`World`]'s `passing`.
+    pub points: bool,
+    /// All other light.
+    pub wide: bool,
 }
 
 /// What a wave's work is kept in.
@@ -71,8 +82,8 @@ const MAPS: EffectSet = EffectSet::of(&[
     Effect::Transparency,
 ]);
 
-/// Effects that send rays on from where others arrive, whatever the material.
-const EVERYWHERE: EffectSet = EffectSet::of(&[Effect::Interreflection]);
+/// Effects that concern light wherever it arrives, whatever the material: it goes on, or has lost something on its way.
+const EVERYWHERE: EffectSet = EffectSet::of(&[Effect::Interreflection, Effect::Absorption]);
 
 /// Effects of materials that send rays on.
 const RAYS: EffectSet = EffectSet::of(&[
@@ -111,7 +122,7 @@ impl<S: Surface> World<'_, S> {
                     let mut next = std::mem::take(&mut waves.queues[1 - now]);
                     let start = Instant::now();
                     self.shade(waves, &paths, &sequence, sums, &mut next, seen.as_deref_mut());
-                    waves.tracer.shading += start.elapsed();
+                    waves.tallies.shading += start.elapsed();
                     waves.queues[1 - now] = next;
                     self.light(waves, sums);
                 }
@@ -292,18 +303,25 @@ impl<S: Surface> World<'_, S> {
 
     /// Looks again at the light that something is in the way of: it may have holes, or let light through.
     fn see_through(&self, waves: &mut Waves) {
-        let lets_light_through = EffectSet::of(&[Effect::Transparency, Effect::Refraction]);
-        let effect = match (&self.holes, self.set.has_any(lets_light_through)) {
-            (_, true) => Effect::Transparency,
-            (Some(_), false) => Effect::CutOuts,
-            (None, false) => return,
+        let LetsPass { points, wide } = self.lets_pass;
+        let effect = match &self.holes {
+            Some(_) if !points => Effect::CutOuts,
+            None if !points => return,
+            _ if self.set.has(Effect::Transparency) => Effect::Transparency,
+            _ => Effect::Refraction,
         };
         let start = Instant::now();
         let Waves { tracer, lights, occluded, rays, hits, asked, tallies, .. } = waves;
+        let may_pass = |light: &LightRay| match light.effect {
+            _ if self.holes.is_some() => true,
+            Effect::Shadows | Effect::AmbientOcclusion => points,
+            _ => wide,
+        };
         asked.clear();
-        asked.extend((0..lights.len()).filter(|&i| occluded[i]));
-        let mut cast = asked.len() as u64;
+        asked.extend((0..lights.len()).filter(|&i| occluded[i] && may_pass(&lights[i])));
+        let mut cast = 0;
         if let (Some(holes), Effect::CutOuts) = (&self.holes, effect) {
+            cast += asked.len() as u64;
             tracer.occluded_sifted(self.accel, holes, lights, asked, occluded);
         } else {
             // Layer by layer, each taking its part of the light.
