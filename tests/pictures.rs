@@ -7,7 +7,7 @@ use image::RgbImage;
 use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::generate::plant::{self, PlantParams};
-use raypack::render::{Frame, RenderSettings, Renderer, Size, Staged, Wishes, image as pictures};
+use raypack::render::{Frame, Limits, RenderSettings, Renderer, Size, Staged, Wishes, image as pictures};
 use raypack::scene::effects::Request;
 use raypack::scene::{Camera, Lighting};
 use raypack::study::accuracy::tradeoff::Judge;
@@ -61,7 +61,7 @@ fn the_gallery_looks_as_it_should() {
         lighting,
         environment: None,
         samples: Some(32),
-        bounces: 6,
+        limits: Limits { bounces: 6, ..Limits::default() },
         error: None,
     };
     let staged = Staged::new(&accel, &mesh, &camera, wishes);

@@ -6,7 +6,7 @@ use super::outputs::same_file;
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::files::check_writable;
-use crate::render::Tuning;
+use crate::render::{Limits, Tuning};
 use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::study::accuracy::tradeoff::{Options, plot, run as study};
@@ -70,6 +70,18 @@ pub struct Args {
     /// the reference picture has the most of them
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "8")]
     bounces: Vec<u32>,
+    /// The same for rays that each matt surface sends to lights that have an extent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1")]
+    shadow_samples: Vec<u32>,
+    /// The same for the part of the light below which paths go on by chance
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "0.015625",
+        allow_hyphen_values = true
+    )]
+    roulette: Vec<f32>,
     /// Rays of each kind whose answers are held against exact arithmetic; the others are timed only
     #[arg(long, value_name = "N", default_value_t = 1 << 16)]
     oracle_rays: usize,
@@ -120,6 +132,20 @@ pub fn run(args: &Args) -> Result<()> {
     args.json.give(&report.to_string(), &report)
 }
 
+impl Args {
+    /// Each with each.
+    fn limits(&self) -> Vec<Limits> {
+        let mut all = Vec::new();
+        for &bounces in &self.bounces {
+            for &shadow_samples in &self.shadow_samples {
+                let with = |&roulette: &f32| Limits { bounces, shadow_samples, roulette, error: 0.0 };
+                all.extend(self.roulette.iter().map(with));
+            }
+        }
+        all
+    }
+}
+
 fn options(args: &Args) -> Result<Options> {
     if args.rounds == 0 {
         return Err(Error::option("--rounds", "0 rounds measure nothing"));
@@ -153,7 +179,7 @@ fn options(args: &Args) -> Result<Options> {
         samples,
         reference_samples: args.reference_samples.unwrap_or(most.saturating_mul(REFERENCE_FACTOR)),
         request: args.effects.parse()?,
-        bounces: args.bounces.clone(),
+        limits: args.limits(),
         oracle_rays: args.oracle_rays,
         within,
         seed: args.seed,

@@ -26,6 +26,12 @@ pub struct LooksOptions {
     /// Surfaces that a ray's light may have met before the one that is seen
     #[arg(long, value_name = "N", default_value_t = Limits::default().bounces)]
     bounces: u32,
+    /// Rays that each matt surface sends to lights that have an extent
+    #[arg(long, value_name = "N", default_value_t = Limits::default().shadow_samples)]
+    shadow_samples: u32,
+    /// Paths that bring less than this part of the light go on by chance; 0 has all go on
+    #[arg(long, value_name = "PART", default_value_t = Limits::default().roulette, allow_hyphen_values = true)]
+    roulette: f32,
     /// Take no more samples of a pixel when the standard error of its brightness, of 0 for black to 1 for white, is
     /// this; 0 takes all [default: 0.02 if effects of chance run and --samples is not given, else 0]
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true)]
@@ -38,8 +44,7 @@ impl LooksOptions {
     /// # Errors
     /// An option makes no sense, or there is no such environment.
     pub fn check(&self) -> Result<Request> {
-        let error = self.error.unwrap_or(0.0);
-        Limits { bounces: self.bounces, error }.check()?;
+        self.limits().check()?;
         let request: Request = self.effects.parse()?;
         match &self.environment {
             Some(path) if !path.is_file() => {
@@ -48,6 +53,11 @@ impl LooksOptions {
             }
             _ => Ok(request),
         }
+    }
+
+    fn limits(&self) -> Limits {
+        let Self { bounces, shadow_samples, roulette, .. } = *self;
+        Limits { bounces, shadow_samples, roulette, error: self.error.unwrap_or(0.0) }
     }
 
     /// Finds out what a scene calls for and opens what is needed for it.
@@ -79,7 +89,7 @@ impl LooksOptions {
             lighting,
             environment: environment.zip(name.as_deref()),
             samples,
-            bounces: self.bounces,
+            limits: self.limits(),
             error: self.error,
         };
         let staged = scene.reading(|| Staged::new(&scene.accel, surface, camera, wishes))?;

@@ -56,6 +56,9 @@ fn in_a_box_that_glows_light_adds_up_to_the_geometric_series() {
     let mesh = scene.mesh();
     let shot = Shot { samples: Some(256), ..Shot::new(Vec3::ZERO, Vec3::new(0.3, 0.2, -1.0)) };
     assert_light(shot.mean(&mesh), Vec3::new(2.0, 4.0 / 3.0, 1.0), 0.02);
+    // However many rays look for the light, it is the same.
+    let shot = Shot { shadow_samples: 3, ..shot };
+    assert_light(shot.mean(&mesh), Vec3::new(2.0, 4.0 / 3.0, 1.0), 0.02);
     // One surface before the one that is seen: e + a e.
     let shot = Shot { bounces: 0, ..shot };
     assert_light(shot.mean(&mesh), Vec3::new(1.5, 1.25, 1.0), 0.02);

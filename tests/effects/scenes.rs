@@ -3,7 +3,7 @@
 use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::{Attributes, Colors, Image, Material, Mesh};
-use raypack::render::{Frame, FrameStats, RenderSettings, Renderer, Size, Staged, Wishes};
+use raypack::render::{Frame, FrameStats, Limits, RenderSettings, Renderer, Size, Staged, Wishes};
 use raypack::scene::{Camera, Environment, Lighting, Surface};
 use raypack::traverse::Accel;
 
@@ -70,6 +70,7 @@ pub struct Shot {
     pub effects: &'static str,
     pub samples: Option<u32>,
     pub bounces: u32,
+    pub shadow_samples: u32,
     pub environment: Option<Vec3>,
     pub lighting: Lighting,
 }
@@ -82,6 +83,7 @@ impl Shot {
             effects: "auto",
             samples: None,
             bounces: 32,
+            shadow_samples: 1,
             environment: None,
             lighting: Lighting::outdoors(Vec3::Y, Vec3::Y),
         }
@@ -93,7 +95,11 @@ impl Shot {
             lighting: self.lighting,
             environment: self.environment.map(|light| (Environment::uniform(light), "uniform")),
             samples: self.samples,
-            bounces: self.bounces,
+            limits: Limits {
+                bounces: self.bounces,
+                shadow_samples: self.shadow_samples,
+                ..Limits::default()
+            },
             error: self.samples.map(|_| 0.0),
         };
         Staged::new(accel, surface, &self.camera, wishes)

@@ -11,6 +11,8 @@ use crate::scene::texture::Textures;
 use crate::scene::{Lights, Surface};
 use crate::traverse::{Accel, Kernel};
 use glam::Vec3;
+use serde::Serialize;
+use std::fmt;
 
 /// The effects of a picture, and what they need beside the surfaces.
 #[derive(Debug)]
@@ -26,10 +28,17 @@ pub struct Appearance {
 }
 
 /// How accurate a picture is to be: more takes longer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
     /// Surfaces that a ray's light may have met before the one that the eye sees.
     pub bounces: u32,
+    /// Points of lights that have an extent, and directions of an environment, that each matt surface asks for their
+    /// light, each with a ray.
+    pub shadow_samples: u32,
+    /// A path that brings less than this part of the light goes on by chance, as often as it brings of it, and counts for
+    /// more if it does ("Russian roulette": Arvo & Kirk, "Particle transport and image synthesis", 1990); 0 has all go
+    /// on.
+    pub roulette: f32,
     /// The standard error of a pixel's brightness, where black is 0 and white 1, at which no more samples are taken
     /// of it; 0 takes as many as there may be.
     pub error: f32,
@@ -38,9 +47,20 @@ pub struct Limits {
 /// The most bounces that make sense.
 const MAX_BOUNCES: u32 = 1024;
 
+/// The most rays to lights that make sense.
+const MAX_SHADOW_SAMPLES: u32 = 256;
+
 impl Default for Limits {
     fn default() -> Self {
-        Self { bounces: 8, error: 0.0 }
+        Self { bounces: 8, shadow_samples: 1, roulette: 1.0 / 64.0, error: 0.0 }
+    }
+}
+
+impl fmt::Display for Limits {
+    /// All but the error.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bounces, shadow_samples, roulette, .. } = self;
+        write!(f, "{bounces} bounces, {shadow_samples} to lights, roulette {roulette}")
     }
 }
 
@@ -53,6 +73,14 @@ impl Limits {
         if self.bounces > MAX_BOUNCES {
             let message = format!("{} is not a number from 0 to {MAX_BOUNCES}", self.bounces);
             return Err(Error::option("--bounces", message));
+        }
+        if !(1..=MAX_SHADOW_SAMPLES).contains(&self.shadow_samples) {
+            let message = format!("{} is not a number from 1 to {MAX_SHADOW_SAMPLES}", self.shadow_samples);
+            return Err(Error::option("--shadow-samples", message));
+        }
+        if !(0.0..=1.0).contains(&self.roulette) {
+            let message = format!("{} is not a part of the light from 0 to 1, such as 0.02", self.roulette);
+            return Err(Error::option("--roulette", message));
         }
         if !(0.0..1.0).contains(&self.error) {
             let message = format!("{} is not a number from 0 to less than 1, such as 0.01", self.error);
@@ -90,8 +118,8 @@ impl Appearance {
                 textures,
                 set,
             },
-            direct: Direct { lights, set, reach: diagonal * REACH },
-            bounce: Bounce { set, limit: limits.bounces },
+            direct: Direct { lights, set, reach: diagonal * REACH, samples: limits.shadow_samples },
+            bounce: Bounce { set, limit: limits.bounces, faint: limits.roulette },
             holes,
             set,
             lets_pass: lets_pass(surface, set),
@@ -122,6 +150,8 @@ mod tests {
     fn absurd_limits_name_their_option() {
         Limits::default().check().expect("good");
         let wrong = |limits: Limits| limits.check().expect_err("absurd").to_string();
+        assert!(wrong(Limits { shadow_samples: 0, ..Limits::default() }).starts_with("--shadow-samples: 0"));
+        assert!(wrong(Limits { roulette: 1.5, ..Limits::default() }).starts_with("--roulette: 1.5"));
         assert!(wrong(Limits { bounces: 2000, ..Limits::default() }).starts_with("--bounces: 2000"));
         for error in [-0.1, 1.0, f32::NAN] {
             assert!(wrong(Limits { error, ..Limits::default() }).starts_with("--error: "));

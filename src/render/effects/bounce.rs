@@ -42,12 +42,11 @@ pub struct Bounce {
     pub set: EffectSet,
     /// Surfaces that a path may meet after the first.
     pub limit: u32,
+    /// Below this part of the light, a path goes on by chance, and counts for more if it does.
+    pub faint: f32,
 }
 
-/// Below this part of the light, a path goes on by chance, and counts for more if it does.
-const FAINT: f32 = 1.0 / 64.0;
-
-/// From so many surfaces on, light between matt surfaces goes on by chance.
+/// From so many surfaces on, light between matt surfaces goes on by chance, as often as the last of them is bright.
 const DEEP: u16 = 3;
 
 impl Bounce {
@@ -203,7 +202,7 @@ impl Bounce {
             return;
         }
         let mut weight = matt;
-        if path.depth >= DEEP {
+        if path.depth >= DEEP && self.faint > 0.0 {
             let stays = point.diffuse.max_element().clamp(0.05, 0.95);
             if path.random(sequence, Use::Roulette)[1] >= stays {
                 return;
@@ -253,8 +252,8 @@ impl Bounce {
             Way::Diffuse => path.density = cosine_density(point.normal.dot(toward)),
             _ => {}
         }
-        if strength < FAINT {
-            let stays = strength / FAINT;
+        if strength < self.faint {
+            let stays = strength / self.faint;
             if path.random(sequence, Use::Roulette)[0] >= stays {
                 return;
             }

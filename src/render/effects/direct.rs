@@ -35,6 +35,8 @@ pub struct Direct<'a> {
     pub set: EffectSet,
     /// How far a surface may be that takes light from everywhere away.
     pub reach: f32,
+    /// Rays to lights that have an extent.
+    pub samples: u32,
 }
 
 impl Direct<'_> {
@@ -51,7 +53,7 @@ impl Direct<'_> {
         sum: &mut Vec3,
         rays: &mut Vec<LightRay>,
     ) {
-        let Scattered { matt, lights: gloss, .. } = *scattered;
+        let matt = scattered.matt;
         let mut add = |effect: Effect, ray: Ray, light: Vec3| {
             if light.max_element() <= 0.0 {
             } else if self.set.has(effect) {
@@ -66,36 +68,13 @@ impl Direct<'_> {
             let light = self.key(point, &way, scattered);
             add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
         }
-        if let Some(emitters) = &self.lights.emitters {
-            let light = emitters.sample_for(
-                origin,
-                path.random(sequence, Use::Light),
-                path.random(sequence, Use::LightPlace),
-            );
-            let way = light.position - origin;
-            let distance = way.length();
-            let toward = way / distance;
-            let cosines = point.normal.dot(toward).max(0.0) * light.normal.dot(toward).abs();
-            // A point on the light itself, or on its back's edge, gets nothing from here.
-            if cosines > 0.0 && point.face.dot(toward) > 0.0 && distance > 0.0 && light.pdf_area > 0.0 {
-                let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
-                let share = share(looks_around, by_angle, point.normal.dot(toward));
-                let thrown = matt * (FRAC_1_PI * share) + gloss * self.lobe(point, toward, SHARPEST_OF_WIDE);
-                let light = thrown * light.radiance * (cosines / (distance * distance * light.pdf_area));
-                // Short of the light, which would hide itself.
-                let ray = Ray::segment(origin, way, 0.0, 1.0 - 1e-4);
-                add(Effect::SoftShadows, ray, light);
+        for time in 0..self.samples {
+            let random = |what| path.random_of(sequence, what, time);
+            if let Some(found) = self.light_of_surfaces(point, origin, scattered, looks_around, random) {
+                add(Effect::SoftShadows, found.0, found.1);
             }
-        }
-        if let Some(environment) = &self.lights.environment {
-            let sample = environment.sample(path.random(sequence, Use::Environment));
-            let cosine = point.normal.dot(sample.direction);
-            if cosine > 0.0 && point.face.dot(sample.direction) > 0.0 && sample.pdf > 0.0 {
-                let share = share(looks_around, sample.pdf, cosine);
-                let thrown =
-                    matt * (FRAC_1_PI * share) + gloss * self.lobe(point, sample.direction, SHARPEST_OF_WIDE);
-                let light = thrown * sample.radiance * (cosine / sample.pdf);
-                add(Effect::Environment, Ray::new(origin, sample.direction), light);
+            if let Some(found) = self.light_from_afar(point, origin, scattered, looks_around, random) {
+                add(Effect::Environment, found.0, found.1);
             }
         }
         if self.set.has(Effect::Interreflection) {
@@ -114,17 +93,71 @@ impl Direct<'_> {
         }
     }
 
-    /// The density by solid angle with which a light would have been looked for that a path has met.
+    /// A point on a light: the ray to it, and the light that arrives.
+    fn light_of_surfaces(
+        &self,
+        point: &Point<'_>,
+        origin: Vec3,
+        scattered: &Scattered,
+        looks_around: bool,
+        random: impl Fn(Use) -> [f32; 2],
+    ) -> Option<(Ray, Vec3)> {
+        let emitters = self.lights.emitters.as_ref()?;
+        let light = emitters.sample_for(origin, random(Use::Light), random(Use::LightPlace));
+        let way = light.position - origin;
+        let distance = way.length();
+        let toward = way / distance;
+        let cosines = point.normal.dot(toward).max(0.0) * light.normal.dot(toward).abs();
+        // A point on the light itself, or on its back's edge, gets nothing from here.
+        if cosines.is_nan() || cosines <= 0.0 || point.face.dot(toward) <= 0.0 || light.pdf_area <= 0.0 {
+            return None;
+        }
+        let count = self.samples as f32;
+        let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
+        let share = share(looks_around, by_angle * count, point.normal.dot(toward));
+        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
+        let thrown = scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss;
+        let part = cosines / (distance * distance * light.pdf_area * count);
+        // Short of the light, which would hide itself.
+        Some((Ray::segment(origin, way, 0.0, 1.0 - 1e-4), thrown * light.radiance * part))
+    }
+
+    /// The same from infinitely far away.
+    fn light_from_afar(
+        &self,
+        point: &Point<'_>,
+        origin: Vec3,
+        scattered: &Scattered,
+        looks_around: bool,
+        random: impl Fn(Use) -> [f32; 2],
+    ) -> Option<(Ray, Vec3)> {
+        let sample = self.lights.environment.as_ref()?.sample(random(Use::Environment));
+        let toward = sample.direction;
+        let cosine = point.normal.dot(toward);
+        if cosine <= 0.0 || point.face.dot(toward) <= 0.0 || sample.pdf <= 0.0 {
+            return None;
+        }
+        let count = self.samples as f32;
+        let share = share(looks_around, sample.pdf * count, cosine);
+        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
+        let thrown = scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss;
+        Some((Ray::new(origin, toward), thrown * sample.radiance * (cosine / (sample.pdf * count))))
+    }
+
+    /// The density by solid angle with which a light would have been looked for that a path has met, all tries together.
     pub fn density_of(&self, path: &Path, point: &Point<'_>) -> f32 {
         let Some(emitters) = &self.lights.emitters else { return 0.0 };
         let by_area = emitters.pdf_area_for(path.from, point.primitive);
         let place = path.ray.origin - point.toward * point.distance;
-        by_solid_angle(by_area, place - path.from, point.face)
+        by_solid_angle(by_area, place - path.from, point.face) * self.samples as f32
     }
 
     /// The same for the light from around.
     pub fn density_around(&self, direction: Vec3) -> f32 {
-        self.lights.environment.as_ref().map_or(0.0, |environment| environment.pdf(direction))
+        self.lights
+            .environment
+            .as_ref()
+            .map_or(0.0, |environment| environment.pdf(direction) * self.samples as f32)
     }
 
     /// Light of the key light. Its irradiance is what a white surface that faces it throws back: that divided by

@@ -116,6 +116,14 @@ impl Path {
         sequence.pair(self.branch.wrapping_mul(USES).wrapping_add(what as u32))
     }
 
+    /// Two random numbers for each of several times that the same is done.
+    #[inline]
+    pub fn random_of(&self, sequence: &Sequence, what: Use, time: u32) -> [f32; 2] {
+        // The first time as if there were no other.
+        let branch = self.branch ^ time.wrapping_mul(0x85eb_ca6b);
+        sequence.pair(branch.wrapping_mul(USES).wrapping_add(what as u32))
+    }
+
     /// The number of the path that goes on from it in a way.
     #[inline]
     pub fn branch_of(&self, way: Way) -> u32 {

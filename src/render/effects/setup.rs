@@ -21,10 +21,9 @@ pub struct Wishes<'a> {
     pub environment: Option<(Environment, &'a str)>,
     /// Samples per pixel, at most; `None`: one, or [`MANY`] where some effect shows chance values.
     pub samples: Option<u32>,
-    /// How far accuracy goes; an error of `None` takes all samples that were asked for, and stops at [`FINE`] where
-    /// none were.
-    pub bounces: u32,
-    /// See [`Limits::error`].
+    /// How far accuracy goes, but for the error.
+    pub limits: Limits,
+    /// See [`Limits::error`]; `None` takes all samples that were asked for, and stops at [`FINE`] where none were.
     pub error: Option<f32>,
 }
 
@@ -55,7 +54,7 @@ impl Staged {
     ///
     /// Panics if a scene that is not all in memory cannot be read: see [`Cached::or_error`](crate::cache::Cached).
     pub fn new(accel: &Accel, surface: &impl Surface, camera: &Camera, wishes: Wishes<'_>) -> Self {
-        let Wishes { request, lighting, environment, samples, bounces, error } = wishes;
+        let Wishes { request, lighting, environment, samples, limits, error } = wishes;
         let is_off = |effect| request.of(effect) == Some(false);
         let (environment, name) = match environment.filter(|_| !is_off(Effect::Environment)) {
             Some((environment, name)) => (Some(environment), Some(name)),
@@ -97,7 +96,7 @@ impl Staged {
         if PLAIN.or(set) == PLAIN && lights.ambient.is_some() {
             return Self { analysis, appearance: None, samples, problems };
         }
-        let limits = Limits { bounces, error };
+        let limits = Limits { error, ..limits };
         let appearance = Some(Appearance { set, lights, textures, limits });
         Self { analysis, appearance, samples, problems }
     }
@@ -187,7 +186,7 @@ mod tests {
             lighting: Lighting::outdoors(Vec3::Y, Vec3::new(0.0, 0.6, 0.8)),
             environment: None,
             samples,
-            bounces: 8,
+            limits: Limits::default(),
             error: None,
         };
         Staged::new(&accel, mesh, &camera, wishes)

@@ -31,14 +31,14 @@ pub struct View<'a> {
 }
 
 /// What can be chosen of a picture's accuracy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// The mode.
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
-    /// Surfaces that light may have met before the one that is seen; `None` where no effect asks for it.
-    pub bounces: Option<u32>,
+    /// How far light is followed; `None` where no effect asks for it.
+    pub limits: Option<Limits>,
 }
 
 impl Setting {
@@ -46,7 +46,7 @@ impl Setting {
     pub fn is_default(self) -> bool {
         self.accuracy == Accuracy::default()
             && self.samples == 1
-            && self.bounces.is_none_or(|bounces| bounces == Limits::default().bounces)
+            && self.limits.is_none_or(|limits| limits == Limits::default())
     }
 }
 
@@ -87,24 +87,24 @@ pub fn race(
     let samples = options.reference_samples;
     progress(&format!("rendering the reference picture, exact, {samples} samples per pixel"));
     let start = Instant::now();
-    let bounces = view.appearance.and(options.bounces.iter().max().copied());
-    let setting = Setting { accuracy: Accuracy::Exact, samples, bounces };
+    let limits = view.appearance.map(|_| options.most());
+    let setting = Setting { accuracy: Accuracy::Exact, samples, limits };
     let renderer = renderer_of(&setting, accel(Accuracy::Exact), view, options)?;
     let judge = Judge::new(renderer.frame(view.camera, view.lighting).0);
     let seconds = start.elapsed().as_secs_f64();
-    let reference = ReferencePicture { accuracy: Accuracy::Exact, samples, bounces, seconds };
+    let reference = ReferencePicture { accuracy: Accuracy::Exact, samples, limits, seconds };
 
     progress("rendering frames in every mode");
-    let bounces: Vec<Option<u32>> = match view.appearance {
-        Some(_) => options.bounces.iter().copied().map(Some).collect(),
+    let limits: Vec<Option<Limits>> = match view.appearance {
+        Some(_) => options.limits.iter().copied().map(Some).collect(),
         None => vec![None],
     };
     let settings: Vec<Setting> = options
         .samples
         .iter()
-        .flat_map(|&samples| bounces.iter().map(move |&bounces| (samples, bounces)))
-        .flat_map(|(samples, bounces)| {
-            Accuracy::ALL.into_iter().map(move |accuracy| Setting { accuracy, samples, bounces })
+        .flat_map(|&samples| limits.iter().map(move |&limits| (samples, limits)))
+        .flat_map(|(samples, limits)| {
+            Accuracy::ALL.into_iter().map(move |accuracy| Setting { accuracy, samples, limits })
         })
         .collect();
     let renderers: Vec<Renderer> = settings
@@ -143,10 +143,8 @@ fn renderer_of<'a>(
     options: &Options,
 ) -> Result<Renderer<'a>> {
     let renderer = Renderer::new(accel, view.mesh, options.settings(setting.samples))?;
-    match (view.appearance, setting.bounces) {
-        (Some(appearance), Some(bounces)) => {
-            renderer.with_appearance(appearance)?.with_limits(Limits { bounces, error: 0.0 })
-        }
+    match (view.appearance, setting.limits) {
+        (Some(appearance), Some(limits)) => renderer.with_appearance(appearance)?.with_limits(limits),
         _ => Ok(renderer),
     }
 }

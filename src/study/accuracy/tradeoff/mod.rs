@@ -62,8 +62,8 @@ pub struct Options {
     pub reference_samples: u32,
     /// What to make of the effects that the scene calls for.
     pub request: Request,
-    /// Bounces of the pictures, of scenes whose effects ask for any; the reference has the most of them.
-    pub bounces: Vec<u32>,
+    /// How far light is followed in the pictures, of scenes whose effects ask for it.
+    pub limits: Vec<Limits>,
     /// How many rays of each kind are held against the reference at most, evenly chosen.
     pub oracle_rays: usize,
     /// The frame time in seconds to pick a setting for.
@@ -107,12 +107,10 @@ impl Options {
         for &samples in &self.samples {
             RenderSettings { samples, ..self.settings(1) }.check()?;
         }
-        if self.bounces.is_empty() {
+        if self.limits.is_empty() {
             return wrong("--bounces", "no number of bounces is named".into());
         }
-        for &bounces in &self.bounces {
-            Limits { bounces, error: 0.0 }.check()?;
-        }
+        self.limits.iter().try_for_each(Limits::check)?;
         if !(most..=MAX_REFERENCE_SAMPLES).contains(&self.reference_samples) {
             let message = format!(
                 "{} is not from {most}, the most of --samples, to {MAX_REFERENCE_SAMPLES}",
@@ -121,6 +119,17 @@ impl Options {
             return wrong("--reference-samples", message);
         }
         Ok(())
+    }
+
+    /// The farthest that light is followed.
+    fn most(&self) -> Limits {
+        let start = Limits { roulette: 1.0, ..Limits::default() };
+        self.limits.iter().fold(Limits { bounces: 0, ..start }, |most, limits| Limits {
+            bounces: most.bounces.max(limits.bounces),
+            shadow_samples: most.shadow_samples.max(limits.shadow_samples),
+            roulette: most.roulette.min(limits.roulette),
+            error: 0.0,
+        })
     }
 
     fn settings(&self, samples: u32) -> RenderSettings {
@@ -185,7 +194,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
         lighting,
         environment: None,
         samples: Some(1),
-        bounces: Limits::default().bounces,
+        limits: Limits::default(),
         error: Some(0.0),
     };
     let staged = Staged::new(&accel, mesh, &camera, wishes);

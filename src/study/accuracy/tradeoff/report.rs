@@ -5,7 +5,7 @@ use super::participants::Participant;
 use super::picture::PictureError;
 use crate::geometry::Accuracy;
 use crate::kdtree::BuildParams;
-use crate::render::{FrameStats, Size, Tuning};
+use crate::render::{FrameStats, Limits, Size, Tuning};
 use crate::simd::Isa;
 use crate::study::accuracy::Errors;
 use crate::study::bench::EngineInfo;
@@ -133,9 +133,9 @@ pub struct ReferencePicture {
     pub accuracy: Accuracy,
     /// Its samples per pixel.
     pub samples: u32,
-    /// Its bounces, where effects ask for any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bounces: Option<u32>,
+    /// How far light is followed, where effects ask for it.
+    #[serde(flatten)]
+    pub limits: Option<Limits>,
     /// Seconds that it took.
     pub seconds: f64,
 }
@@ -149,9 +149,9 @@ pub struct FrameRow {
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
-    /// Surfaces that light may have met before the one that is seen, where effects ask for any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bounces: Option<u32>,
+    /// How far light is followed, where effects ask for it.
+    #[serde(flatten)]
+    pub limits: Option<Limits>,
     /// Whether it is what `raypack render` does unless told otherwise.
     pub default: bool,
     /// Worker threads.
@@ -197,9 +197,9 @@ pub struct Choice {
     pub accuracy: Accuracy,
     /// Samples per pixel.
     pub samples: u32,
-    /// Bounces, where effects ask for any.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bounces: Option<u32>,
+    /// How far light is followed, where effects ask for it.
+    #[serde(flatten)]
+    pub limits: Option<Limits>,
     /// Milliseconds of a frame in the median.
     pub ms: f64,
     /// The quickest frame.
@@ -266,7 +266,7 @@ impl FrameRow {
             engine: "raypack",
             accuracy: setting.accuracy,
             samples: setting.samples,
-            bounces: setting.bounces,
+            limits: setting.limits,
             default: setting.is_default(),
             threads: stats.threads,
             isa: isa.name().into(),
@@ -282,7 +282,7 @@ impl FrameRow {
     }
 
     pub(super) fn setting(&self) -> Setting {
-        Setting { accuracy: self.accuracy, samples: self.samples, bounces: self.bounces }
+        Setting { accuracy: self.accuracy, samples: self.samples, limits: self.limits }
     }
 }
 
@@ -292,7 +292,7 @@ impl Choice {
         Self {
             accuracy: row.accuracy,
             samples: row.samples,
-            bounces: row.bounces,
+            limits: row.limits,
             ms: row.ms,
             ms_low: row.ms_low,
             ms_high: row.ms_high,

@@ -1,6 +1,7 @@
 //! The report as text.
 
 use super::report::{Choice, FrameRow, RayRow, Report, Within};
+use crate::render::Limits;
 use crate::study::text::{figure, grid, grouped};
 use std::fmt;
 
@@ -121,8 +122,8 @@ impl Report {
         ];
         let line = |row: &FrameRow| {
             vec![
-                match row.bounces {
-                    Some(bounces) => format!("{}, {bounces} bounces", row.samples),
+                match row.limits {
+                    Some(limits) => format!("{}; {limits}", row.samples),
                     None => row.samples.to_string(),
                 },
                 row.accuracy.to_string(),
@@ -173,7 +174,10 @@ impl fmt::Display for Choice {
             "--accuracy {} --samples {}{}: {} sample{plural} per pixel, {} ms a frame (median of {}, {} to {}), RMSE {:.6}, SSIMULACRA2 {:.2}",
             self.accuracy,
             self.samples,
-            self.bounces.map_or_else(String::new, |bounces| format!(" --bounces {bounces}")),
+            self.limits.map_or_else(String::new, |limits| {
+                let Limits { bounces, shadow_samples, roulette, .. } = limits;
+                format!(" --bounces {bounces} --shadow-samples {shadow_samples} --roulette {roulette}")
+            }),
             self.samples,
             figure(self.ms),
             self.frames,

@@ -81,7 +81,7 @@ mod tests {
             let error = PictureError { rmse, psnr: None, ssimulacra2: 50.0 };
             let size = Size { width: 8, height: 8 };
             FrameRow::new(
-                Setting { accuracy, samples, bounces: None },
+                Setting { accuracy, samples, limits: None },
                 Isa::Portable,
                 size,
                 &stats,
@@ -114,14 +114,14 @@ mod tests {
         let setting = |choice: &Choice| Setting {
             accuracy: choice.accuracy,
             samples: choice.samples,
-            bounces: choice.bounces,
+            limits: choice.limits,
         };
         assert!((within.budget_ms - budget_ms).abs() < 1e-9);
         (within.fits, setting(&within.picked), within.next.as_ref().map(setting))
     }
 
     fn setting(accuracy: Accuracy, samples: u32) -> Setting {
-        Setting { accuracy, samples, bounces: None }
+        Setting { accuracy, samples, limits: None }
     }
 
     #[test]
