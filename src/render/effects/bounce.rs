@@ -236,7 +236,7 @@ impl Bounce {
             depth: path.depth + 1,
             way,
             density: 0.0,
-            is_indirect: before.is_indirect || way == Way::Diffuse,
+            is_indirect: before.is_indirect || before.way == Way::Diffuse,
             from: origin,
             branch: path.branch_of(way),
             weight,

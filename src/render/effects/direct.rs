@@ -55,6 +55,7 @@ impl Direct<'_> {
     ) {
         let matt = scattered.matt;
         let mut add = |effect: Effect, ray: Ray, light: Vec3| {
+            let light = path.arriving_from_there(light);
             if light.max_element() <= 0.0 {
             } else if self.set.has(effect) {
                 rays.push(LightRay { ray, pixel: path.pixel, effect, light });

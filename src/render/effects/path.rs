@@ -55,7 +55,7 @@ pub struct Path {
     /// The density by solid angle with which its direction was chosen, if the light from there was looked for in
     /// other ways too; 0 if this was the only way.
     pub density: f32,
-    /// Whether it has been thrown on by a matt surface.
+    /// Whether what it meets lights a matt surface by way of other surfaces, not straight.
     pub is_indirect: bool,
     /// Where its direction was chosen: before it went through what is not quite there.
     pub from: Vec3,
@@ -69,8 +69,16 @@ pub struct Path {
     pub media: Media,
 }
 
-/// The most that a path adds to a pixel if it comes from a matt surface by way of mirrors or glass; white is 1.
-const BRIGHTEST: f32 = 4.0;
+/// The most that a path adds to a pixel if a matt surface gets it by way of other surfaces; white is 1.
+const BRIGHTEST: f32 = 2.0;
+
+/// Light that comes along few paths, much of it along each: single ones would stay as bright dots in the picture, so
+/// that each counts for [`BRIGHTEST`] at most.
+#[inline]
+fn dimmed(light: Vec3) -> Vec3 {
+    let brightest = light.max_element();
+    if brightest > BRIGHTEST { light * (BRIGHTEST / brightest) } else { light }
+}
 
 /// What random numbers are for. Each path has its own for each use.
 #[derive(Clone, Copy, Debug)]
@@ -89,17 +97,16 @@ pub enum Use {
 const USES: u32 = 8;
 
 impl Path {
-    /// The light that arrives of what the path has met. What a matt surface gets by way of mirrors and glass comes along
-    /// few paths, and much of it along each: single ones would stay as bright dots in the picture, so that they
-    /// count for [`BRIGHTEST`] at most.
+    /// The light that arrives of what the path has met.
     #[inline]
     pub fn arriving(&self, light: Vec3) -> Vec3 {
-        let brightest = light.max_element();
-        if self.is_indirect && self.density == 0.0 && brightest > BRIGHTEST {
-            light * (BRIGHTEST / brightest)
-        } else {
-            light
-        }
+        if self.is_indirect { dimmed(light) } else { light }
+    }
+
+    /// The light that arrives of what a light throws straight on the surface that the path has met.
+    #[inline]
+    pub fn arriving_from_there(&self, light: Vec3) -> Vec3 {
+        if self.is_indirect || self.way == Way::Diffuse { dimmed(light) } else { light }
     }
 
     /// How much light counts that this path met by chance, where those who looked for it on purpose chose its
