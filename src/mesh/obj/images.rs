@@ -197,7 +197,7 @@ mod tests {
             ("textures/../wood.png", "wood.png"),
             ("D:\\work\\model\\Textures\\brick wall.png", "Textures/Brick Wall.PNG"),
             ("D:\\brick wall.png", "Textures/Brick Wall.PNG"),
-            ("/home/somebody/model/wood.png", "wood.png"),
+            ("/somewhere/else/model/wood.png", "wood.png"),
             ("\\\\server\\share\\wood.png", "wood.png"),
         ] {
             let expected = model.join(file).canonicalize().expect("there");

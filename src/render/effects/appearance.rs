@@ -6,7 +6,7 @@ use super::holes::Holes;
 use super::point::Resolver;
 use super::wave::{LetsPass, World};
 use crate::error::{Error, Result};
-use crate::scene::effects::{Effect, EffectSet, calls_for};
+use crate::scene::effects::{Effect, EffectSet, calls_for, calls_of, used};
 use crate::scene::texture::Textures;
 use crate::scene::{Lights, Surface};
 use crate::traverse::{Accel, Kernel};
@@ -102,11 +102,6 @@ impl Appearance {
         let Self { set, ref lights, ref textures, .. } = *self;
         let bounds = accel.bounds();
         let diagonal = (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length() as f32;
-        let calls = |material| {
-            Effect::ALL
-                .iter()
-                .fold(EffectSet::NONE, |calls, &effect| calls.with(effect, calls_for(material, effect)))
-        };
         let holes = if set.has(Effect::CutOuts) { Holes::new(surface, textures) } else { None };
         World {
             accel,
@@ -114,7 +109,7 @@ impl Appearance {
             surface,
             resolver: Resolver {
                 materials: surface.materials(),
-                calls: surface.materials().iter().map(calls).collect(),
+                calls: surface.materials().iter().map(calls_of).collect(),
                 textures,
                 set,
             },
@@ -130,8 +125,7 @@ impl Appearance {
 /// What light goes straight through some surface that triangles have.
 fn lets_pass(surface: &impl Surface, set: EffectSet) -> LetsPass {
     let uses = surface.uses();
-    let used = surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0);
-    used.fold(LetsPass::default(), |lets_pass, (material, _)| {
+    used(surface.materials(), &uses).fold(LetsPass::default(), |lets_pass, material| {
         let is_thin = set.has(Effect::Transparency) && calls_for(material, Effect::Transparency)
             || set.has(Effect::Refraction) && material.transmission != Vec3::ZERO && material.ior == 1.0;
         let bends = set.has(Effect::Refraction) && material.transmission != Vec3::ZERO;

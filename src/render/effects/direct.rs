@@ -115,9 +115,7 @@ impl Direct<'_> {
         }
         let count = self.samples as f32;
         let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
-        let share = share(looks_around, by_angle * count, point.normal.dot(toward));
-        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
-        let thrown = scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss;
+        let thrown = self.thrown(point, toward, scattered, looks_around, by_angle * count);
         let part = cosines / (distance * distance * light.pdf_area * count);
         // Short of the light, which would hide itself.
         Some((Ray::segment(origin, way, 0.0, 1.0 - 1e-4), thrown * light.radiance * part))
@@ -139,10 +137,23 @@ impl Direct<'_> {
             return None;
         }
         let count = self.samples as f32;
-        let share = share(looks_around, sample.pdf * count, cosine);
-        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
-        let thrown = scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss;
+        let thrown = self.thrown(point, toward, scattered, looks_around, sample.pdf * count);
         Some((Ray::new(origin, toward), thrown * sample.radiance * (cosine / (sample.pdf * count))))
+    }
+
+    /// The part of the light from `toward` that the eye gets, by solid angle, where that direction was looked at on
+    /// purpose, with that density.
+    fn thrown(
+        &self,
+        point: &Point<'_>,
+        toward: Vec3,
+        scattered: &Scattered,
+        looks_around: bool,
+        on_purpose: f32,
+    ) -> Vec3 {
+        let share = share(looks_around, on_purpose, point.normal.dot(toward));
+        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
+        scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss
     }
 
     /// The density by solid angle with which a light would have been looked for that a path has met, all tries together.

@@ -4,7 +4,7 @@ use super::appearance::{Appearance, Limits};
 use super::holes::has_holes;
 use super::task::EffectScratch;
 use crate::mesh::{Image, Map, Material};
-use crate::scene::effects::{Analysis, Around, Effect, EffectSet, Request, calls_for};
+use crate::scene::effects::{Analysis, Around, Effect, EffectSet, Request, calls_of, used};
 use crate::scene::texture::{Problem, Textures};
 use crate::scene::{Camera, Emitters, Environment, Light, Lighting, Lights, Surface};
 use crate::traverse::Accel;
@@ -113,12 +113,12 @@ pub fn memory_beside(
 ) -> usize {
     let may_run = Effect::ALL.iter().filter(|&&effect| request.of(effect) != Some(false));
     let set = may_run.fold(EffectSet::NONE, |set, &effect| set.with(effect, true));
-    let used = || materials.iter().zip(uses).filter(|(_, uses)| **uses > 0).map(|(material, _)| material);
     let is_forced = set.iter().any(|effect| request.of(effect) == Some(true));
-    if !is_forced && !used().any(|material| set.iter().any(|effect| calls_for(material, effect))) {
+    if !is_forced && !used(materials, uses).any(|material| calls_of(material).has_any(set)) {
         return 0;
     }
-    let (textures, _) = Textures::open(images, used().flat_map(|material| needed(material, set)));
+    let (textures, _) =
+        Textures::open(images, used(materials, uses).flat_map(|material| needed(material, set)));
     textures.bytes() + workers * EffectScratch::BYTES
 }
 
@@ -135,8 +135,7 @@ fn emitters(surface: &impl Surface) -> Option<Emitters> {
 /// The maps that a set of effects looks at, of materials that triangles have.
 fn maps(surface: &impl Surface, set: EffectSet) -> Vec<&Map> {
     let uses = surface.uses();
-    let used = surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0);
-    used.flat_map(|(material, _)| needed(material, set)).collect()
+    used(surface.materials(), &uses).flat_map(|material| needed(material, set)).collect()
 }
 
 /// The maps of a material that a set of effects looks at.

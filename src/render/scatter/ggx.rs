@@ -16,7 +16,7 @@ use std::f32::consts::{PI, TAU};
 
 /// Surfaces whose `alpha` is less than this are mirrors: their highlights are smaller than `f32` directions tell
 /// apart well.
-pub const SMOOTH: f32 = 1e-3;
+pub use crate::scene::effects::SMOOTH;
 
 /// Directions nearer to the surface than this see nothing, so that quotients stay finite.
 const GRAZING: f32 = 1e-6;

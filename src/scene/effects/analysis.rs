@@ -52,13 +52,7 @@ impl Analysis {
     /// Looks at all materials that any triangle has, at the lights and at the camera.
     pub fn new(surface: &impl Surface, around: &Around<'_>, request: &Request) -> Self {
         let uses = surface.uses();
-        let used: Vec<&Material> = surface
-            .materials()
-            .iter()
-            .zip(&uses)
-            .filter(|(_, uses)| **uses > 0)
-            .map(|(material, _)| material)
-            .collect();
+        let used: Vec<&Material> = used(surface.materials(), &uses).collect();
         let mut effects: Vec<Call> = Vec::with_capacity(Effect::ALL.len());
         let by_materials = |calls: &dyn Fn(&Material) -> bool| -> Vec<String> {
             let callers: Vec<&Material> = used.iter().copied().filter(|material| calls(material)).collect();
@@ -102,9 +96,7 @@ impl Analysis {
         let call = &mut self.effects[Effect::CutOuts as usize];
         if call.on && call.asked.is_none() {
             let uses = surface.uses();
-            let used = surface.materials().iter().zip(&uses).filter(|(_, uses)| **uses > 0);
-            let callers: Vec<&Material> = used
-                .map(|(material, _)| material)
+            let callers: Vec<&Material> = used(surface.materials(), &uses)
                 .filter(|material| calls_for(material, Effect::CutOuts) && has_holes(material))
                 .collect();
             call.called_for_by = named(&callers);
@@ -122,6 +114,19 @@ impl Analysis {
     pub fn call(&self, effect: Effect) -> &Call {
         &self.effects[effect as usize]
     }
+}
+
+/// The materials that any triangle has: `uses` says how many have each.
+pub(crate) fn used<'m, 'u>(
+    materials: &'m [Material],
+    uses: &'u [u64],
+) -> impl Iterator<Item = &'m Material> + use<'m, 'u> {
+    materials.iter().zip(uses).filter(|(_, uses)| **uses > 0).map(|(material, _)| material)
+}
+
+/// All effects that a material calls for by itself.
+pub(crate) fn calls_of(material: &Material) -> EffectSet {
+    Effect::ALL.iter().fold(EffectSet::NONE, |calls, &effect| calls.with(effect, calls_for(material, effect)))
 }
 
 /// Whether a material calls for an effect by itself.

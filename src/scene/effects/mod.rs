@@ -8,5 +8,6 @@ mod effect;
 mod request;
 
 pub use analysis::{Analysis, Around, Call, SMOOTH, calls_for};
+pub(crate) use analysis::{calls_of, used};
 pub use effect::{Effect, EffectSet};
 pub use request::Request;
