@@ -37,6 +37,9 @@
 //! - **Both sides of a triangle count.** The normal is `(p1 - p0) x (p2 - p0)`, not normalised, whichever
 //!   side the ray came from: its length is twice the triangle's area.
 //! - **A ray that is none** (a NaN anywhere, an infinite origin or direction, a zero direction) is a miss.
+//!
+//! Of a scene that is in memory in part, a block that cannot be read unwinds: see
+//! [`Cached::or_error`](crate::cache::Cached::or_error).
 
 mod choice;
 #[cfg(feature = "numpy")]
@@ -44,7 +47,7 @@ pub mod numpy;
 
 use crate::geometry::{Hit, Ray};
 use crate::render::{Sharing, Workers};
-use crate::traverse::{Accel, Kernel};
+use crate::traverse::{Accel, Kernel, Stopwatch};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
@@ -67,7 +70,7 @@ pub struct Batch<'a> {
 pub struct Traced {
     /// The kernel.
     pub kernel: Kernel,
-    /// Worker threads: no more than there was work for.
+    /// Threads at work at a time: no more than there was work for.
     pub threads: usize,
     /// Wall-clock time, the choice of the kernel included.
     pub seconds: f64,
@@ -121,17 +124,44 @@ impl<'a> Batch<'a> {
             0 => thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
-        let kernel = self.kernel.unwrap_or_else(|| choice::quickest(self.rays, none, &call));
+        let cached = self.accel.cached();
+        if let Some(cached) = cached {
+            cached.begin_frame();
+        }
+        let timed = |kernel, rays: &[Ray], answers: &mut [A]| {
+            let watch = Stopwatch::start(self.accel);
+            call(kernel, rays, answers);
+            watch.elapsed(self.accel)
+        };
+        let kernel = self.kernel.unwrap_or_else(|| choice::quickest(self.rays, none, &timed));
         let jobs: Vec<_> = self.rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)).collect();
-        let outcome = Workers { threads: threads.min(jobs.len()), pin: false, sharing: Sharing::Runs }.run(
+        let threads = threads.min(jobs.len());
+        let workers = match cached {
+            None => Workers { threads, pin: false, sharing: Sharing::Runs },
+            // More threads, of which some wait for their blocks. Rays that follow one another in the file are likely
+            // to need the same ones.
+            Some(cached) => {
+                let threads = cached.workers(threads).min(jobs.len());
+                Workers { threads, pin: false, sharing: Sharing::Queue }
+            }
+        };
+        workers.run(
             jobs,
             || (),
             |(), (rays, answers): (&[Ray], &mut [A])| {
+                // A scene that is in memory in part gives its turns by chunks.
+                let _session = cached.map(|cached| cached.session());
                 call(kernel, rays, answers);
                 self.done.fetch_add(rays.len(), Ordering::Relaxed);
             },
         );
-        Traced { kernel, threads: outcome.states.len(), seconds: start.elapsed().as_secs_f64() }
+        Traced { kernel, threads, seconds: start.elapsed().as_secs_f64() }
+    }
+
+    /// About how many bytes a batch of so many rays takes beside the rays and their answers.
+    pub fn bytes_beside(rays: usize) -> usize {
+        // A job's two slices, which are copied when they are shared out.
+        rays.div_ceil(CHUNK) * 2 * size_of::<(&[Ray], &mut [Hit])>()
     }
 }
 

@@ -1,11 +1,16 @@
 //! How a scene is held that is not all in memory.
 
 use super::report::{Lines, bytes, counted, grouped};
+use super::scene::Scene;
 use crate::cache::policy::Replacement;
 use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
 use crate::error::{Error, Result};
+use crate::geometry::Accuracy;
+use crate::simd::Isa;
+use crate::store;
 use crate::study::resident;
 use serde::Serialize;
+use std::path::Path;
 
 /// `--policy`, `--block` and so on: what becomes of `--memory` with a scene file.
 #[derive(Clone, Debug, clap::Args)]
@@ -58,6 +63,48 @@ impl CacheArgs {
         };
         options.check()?;
         Ok(options)
+    }
+}
+
+/// Memory of a thread that traces: the touched part of its stack, and what it has in work.
+const BYTES_PER_WORKER: usize = 256 << 10;
+
+/// What a scene of which a part is in memory is opened for.
+#[derive(Clone, Copy, Debug)]
+pub struct Within {
+    /// The bytes that the process may take.
+    pub memory: usize,
+    /// How hits will be decided.
+    pub accuracy: Accuracy,
+    /// Threads that will be at work.
+    pub threads: usize,
+    /// What they will trace with.
+    pub isa: Isa,
+}
+
+impl CacheArgs {
+    /// Opens a scene file of which a part will be in memory. `beside` says how many bytes the command will take for
+    /// the scene, beside its threads; it is told their number, of which some will wait.
+    ///
+    /// # Errors
+    /// An option makes no sense, the file is damaged where it is read now, or the memory is too little.
+    pub fn open(
+        &self,
+        path: &Path,
+        within: Within,
+        beside: impl FnOnce(&store::File, usize) -> usize,
+    ) -> Result<Scene> {
+        let Within { memory, accuracy, threads, isa } = within;
+        if accuracy == Accuracy::Fast {
+            let message = "fast keeps a record of every triangle beside the tree, for which --memory has no room; \
+                           choose watertight or exact";
+            return Err(Error::option("--accuracy", message));
+        }
+        let options = self.options()?;
+        let file = store::File::open(path)?;
+        let workers = options.loading.workers(threads);
+        let beside = beside(&file, workers).saturating_add(workers * BYTES_PER_WORKER);
+        Scene::open_within(&file, &options, [memory, beside], threads, isa)
     }
 }
 

@@ -1,11 +1,12 @@
 //! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
 
+use super::cache_options::{CacheArgs, CacheReport, Within};
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration, grouped};
 use super::scene::{Looks, Scene, SceneReport};
-use crate::batch::numpy::{read_rays, write_hits, write_occluded};
+use crate::batch::numpy::{RayFile, write_hits, write_occluded};
 use crate::batch::{Batch, Traced};
 use crate::error::{Error, Result};
 use crate::files::check_writable;
@@ -13,6 +14,7 @@ use crate::geometry::{Accuracy, Hit, Ray};
 use crate::profile::Profile;
 use crate::render::{RayCount, Tuning};
 use crate::simd::Isa;
+use crate::store::is_scene;
 use crate::traverse::Kernel;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -43,6 +45,9 @@ use std::time::Instant;
 /// Any byte order and both array orders (C and Fortran) are read; N may be 0. Beside the model and its
 /// tree, a ray takes 60 bytes of memory, 33 with --any. Triangles count as the reader keeps them: `raypack
 /// info` says what it dropped or split.
+///
+/// With --memory, a part of a .rpk scene file is in memory, so much that all, rays and hits included, stays
+/// within the budget. Answers are the same.
 #[derive(Clone, Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -67,6 +72,8 @@ pub struct Args {
     packet: Option<usize>,
     #[command(flatten)]
     build: BuildOptions,
+    #[command(flatten)]
+    cache: CacheArgs,
     #[command(flatten)]
     json: Json,
 }
@@ -93,23 +100,41 @@ struct Report<'a> {
     /// Seconds of writing the answers.
     write_seconds: f64,
     output: &'a Path,
+    /// What became of the memory, if the scene is not all in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cache: Option<CacheReport>,
 }
+
+/// What is in memory of the files of rays and of hits, while they are read and written.
+const FILES: usize = 1 << 20;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
-    let profile = args.build.profile_for(Some(&args.scene), false)?;
+    let profile = args.build.profile_for(Some(&args.scene), true)?;
     let accuracy = args.accuracy.mode()?;
     let kernel = args.kernel()?;
     let threads = args.threads(&profile)?;
     args.check_output()?;
     args.json.check()?;
 
-    // A fault of the rays is found before the model is read and built.
     let start = Instant::now();
-    let rays = read_rays(&args.rays)?;
-    let rays_read_seconds = start.elapsed().as_secs_f64();
-    let mut scene = Scene::prepare(&args.scene, &args.build, &profile.build, isa)?;
+    let file = RayFile::open(&args.rays)?;
+    // Whether there is memory for the rays is known before they are read.
+    let part = match args.build.limit()? {
+        Some(memory) if is_scene(&args.scene) => {
+            Some(args.open_within(file.count(), Within { memory, accuracy, threads, isa })?)
+        }
+        _ => None,
+    };
+    let opened_seconds = part.as_ref().map_or(0.0, Scene::open_seconds);
+    // A fault of the rays is found before a model is read and built.
+    let rays = file.read()?;
+    let rays_read_seconds = start.elapsed().as_secs_f64() - opened_seconds;
+    let mut scene = match part {
+        Some(scene) => scene,
+        None => Scene::prepare(&args.scene, &args.build, &profile.build, isa)?,
+    };
     scene.accel.set_accuracy(accuracy);
 
     let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
@@ -128,6 +153,7 @@ pub fn run(args: &Args) -> Result<()> {
         rays_read_seconds,
         write_seconds,
         output: &args.output,
+        cache: scene.cache_report(&args.build)?,
     };
     args.json.give(&args.text(&scene, &report), &report)
 }
@@ -147,6 +173,14 @@ impl Args {
         let tuning = Tuning { threads, ..Tuning::default() };
         tuning.check().map_err(as_option)?;
         Ok(tuning.worker_count())
+    }
+
+    /// The scene file, of which a part will be in memory, for so many rays.
+    fn open_within(&self, rays: usize, within: Within) -> Result<Scene> {
+        let answer = if self.any { size_of::<bool>() } else { size_of::<Hit>() };
+        let each = size_of::<Ray>() + answer;
+        let beside = rays.saturating_mul(each).saturating_add(Batch::bytes_beside(rays) + FILES);
+        self.cache.open(&self.scene, within, |_, _| beside)
     }
 
     /// Finds out before any work whether the output can be written, and is not one of the other files.
@@ -220,6 +254,9 @@ impl Args {
         );
         lines.add("hits", grouped(report.hits));
         lines.add("wrote", format!("{} in {}", self.output.display(), duration(report.write_seconds)));
+        if let Some(cache) = &report.cache {
+            cache.describe(&mut lines);
+        }
         lines.text().to_owned()
     }
 }

@@ -42,8 +42,8 @@ pub struct BuildOptions {
     #[arg(long, value_name = "preview|standard|best")]
     preset: Option<String>,
     /// The memory that model and build may take, as 512MiB or 2GiB: the tree is made coarser to fit, and
-    /// where that does not do, it is refused before the build starts. Of a scene file, render holds as much as
-    /// fits and reads the rest when it is needed [default: no limit]
+    /// where that does not do, it is refused before the build starts. Of a scene file, render and cast hold as
+    /// much as fits and read the rest when it is needed [default: no limit]
     #[arg(long, value_name = "SIZE")]
     memory: Option<String>,
 }

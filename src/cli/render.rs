@@ -3,7 +3,7 @@
 mod heat;
 mod report;
 
-use super::cache_options::{CacheArgs, CacheReport};
+use super::cache_options::{CacheArgs, Within};
 use super::looks::LooksOptions;
 use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions, as_option, orbit};
@@ -12,7 +12,6 @@ use super::progress::watch;
 use super::report::Json;
 use super::scene::{Looks, Scene};
 use crate::error::{Error, Result};
-use crate::geometry::Accuracy;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
 use crate::render::{First, RenderSettings, Renderer, Size, Tuning, memory_beside};
@@ -125,7 +124,8 @@ pub fn run(args: &Args) -> Result<()> {
 
     let mut scene = match (&args.scene, args.build.limit()?) {
         (Some(path), Some(memory)) if is_scene(path) => {
-            args.open_within(path, memory, &settings, accuracy, isa)?
+            let threads = settings.tuning.worker_count();
+            args.open_within(path, &settings, Within { memory, accuracy, threads, isa })?
         }
         (Some(path), _) => Scene::prepare(path, &args.build, &profile.build, isa)?,
         (None, _) => Model::demo().build(&args.build, &profile.build, isa)?,
@@ -144,41 +144,23 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// Memory of a thread that renders: the touched part of its stack, and its tile.
-const BYTES_PER_WORKER: usize = 256 << 10;
-
 impl Args {
     /// A scene file of which a part will be in memory.
-    fn open_within(
-        &self,
-        path: &Path,
-        memory: usize,
-        settings: &RenderSettings,
-        accuracy: Accuracy,
-        isa: Isa,
-    ) -> Result<Scene> {
-        let wrong = |option: &str, message: &str| Err(Error::option(option, message));
-        if accuracy == Accuracy::Fast {
-            return wrong(
-                "--accuracy",
-                "fast keeps a record of every triangle beside the tree, for which --memory has no room; choose \
-                 watertight or exact",
-            );
-        }
+    fn open_within(&self, path: &Path, settings: &RenderSettings, within: Within) -> Result<Scene> {
         if self.heatmap.is_some() {
-            return wrong("--heatmap", "it walks a tree that is all in memory; leave --memory out");
+            let message = "it walks a tree that is all in memory; leave --memory out";
+            return Err(Error::option("--heatmap", message));
         }
-        let options = self.cache.options()?;
-        let threads = settings.tuning.worker_count();
+        let request = self.looks.check()?;
         // The picture that a frame was at first stays until the frame is complete.
         let frames = 1 + usize::from(self.first_within.is_some());
-        let file = store::File::open(path)?;
-        let workers = options.loading.workers(threads);
-        let meta = file.meta();
-        let request = self.looks.check()?;
-        let effects = memory_beside(meta.colors.materials(), &meta.uses, &file.images(), &request, workers);
-        let beside = frames * settings.frame_bytes() + workers * BYTES_PER_WORKER + effects;
-        Scene::open_within(&file, &options, [memory, beside], threads, isa)
+        let beside = |file: &store::File, workers| {
+            let meta = file.meta();
+            let materials = meta.colors.materials();
+            let effects = memory_beside(materials, &meta.uses, &file.images(), &request, workers);
+            frames * settings.frame_bytes() + effects
+        };
+        self.cache.open(path, within, beside)
     }
 
     /// Draws what pixels cost.
@@ -284,8 +266,7 @@ impl Args {
             }
             Ok::<(), Error>(())
         })?;
-        let cached = scene.accel.cached().zip(self.build.limit()?);
-        let cache = cached.map(|(cached, budget)| CacheReport::new(budget, cached));
+        let cache = scene.cache_report(&self.build)?;
         let report = Report::new(
             scene,
             renderer.settings(),

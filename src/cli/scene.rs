@@ -1,6 +1,6 @@
 //! What commands trace: a model and its tree, just built, or a scene file.
 
-use super::cache_options::taken_so_far;
+use super::cache_options::{CacheReport, taken_so_far};
 use super::model::Model;
 use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
@@ -193,6 +193,23 @@ impl Scene {
             Looks::Mesh(mesh) => Some(mesh),
             Looks::Stored(_) | Looks::Cached(_) => None,
         }
+    }
+
+    /// Seconds of opening a scene file; none for what was built.
+    pub fn open_seconds(&self) -> f64 {
+        match &self.origin {
+            Origin::Opened { open_seconds, .. } => *open_seconds,
+            Origin::Built { .. } => 0.0,
+        }
+    }
+
+    /// What there is to say about the memory given, in the end, if a part of the scene is in memory.
+    ///
+    /// # Errors
+    /// The memory given is no size.
+    pub fn cache_report(&self, options: &BuildOptions) -> Result<Option<CacheReport>> {
+        let cached = self.accel.cached().zip(options.limit()?);
+        Ok(cached.map(|(cached, budget)| CacheReport::new(budget, cached)))
     }
 
     /// The report's part about model and tree.

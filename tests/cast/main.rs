@@ -221,6 +221,65 @@ fn threads_packets_and_instruction_sets_change_nothing() {
     }
 }
 
+/// Rays down on a plant of some 150 m, and through it.
+fn over_a_plant(count: u32) -> Vec<[f32; 8]> {
+    let place = |i: u32, step: u32| (i.wrapping_mul(step) >> 16) as f32 / 65536.0 * 160.0 - 80.0;
+    (0..count)
+        .map(|i| {
+            let (x, z) = (place(i, 2_654_435_769), place(i, 2_246_822_519));
+            [x, 60.0, z, 0.0, z * 0.01, -1.0, x * 0.01, INF]
+        })
+        .collect()
+}
+
+#[test]
+fn hits_are_the_same_within_the_memory_given() {
+    const RAYS: u32 = 70_000;
+    const BUDGET: u64 = 52 << 20;
+    let place = Place::new();
+    place.succeed("generate plant --triangles 400k --seed 5 -o plant.ply");
+    place.succeed("build plant.ply -o plant.rpk");
+    place.write("rays.npy", npy(&over_a_plant(RAYS)));
+    let alone = "--loading sync --policy lru --packet 8";
+    let large = "--packet 16 --block 16384";
+    for (any, how) in [("", ""), ("", alone), ("", large), ("--any", "")] {
+        place.succeed(&format!("cast plant.rpk --rays rays.npy -o whole.npz {any} --packet 8"));
+        let cast = format!("cast plant.rpk --rays rays.npy -o part.npz {any} --threads 2 {how}");
+        place.succeed(&format!("{cast} --memory 52MiB --json part.json"));
+        assert!(place.read("part.npz") == place.read("whole.npz"), "{any} {how}");
+        let report = place.json("part.json");
+        let cache = &report["cache"];
+        let number = |key: &str| cache[key].as_u64().unwrap_or_else(|| panic!("{key} in {cache}"));
+        assert_eq!((number("budget"), &report["threads"]), (BUDGET, &2.into()));
+        assert!(report["hits"].as_u64() > Some(u64::from(RAYS) / 4), "{report}");
+        assert!(number("peak_blocks") < number("data"), "{cache}");
+        assert!(number("loads") > 0 && number("bytes_read") >= number("loads") * 1000, "{cache}");
+        let hits = cache["hit_ratio"].as_f64().expect("a share");
+        assert!((0.0..1.0).contains(&hits) && cache["stalled"].is_f64(), "{cache}");
+        if cfg!(target_os = "linux") {
+            assert!(number("peak_resident") <= BUDGET, "{any} {how}: {cache}");
+        }
+    }
+    let text = place.succeed("cast plant.rpk --rays rays.npy -o part.npz --memory 52MiB");
+    assert!(text.contains("of 52.0 MiB at most") && text.contains("% of uses hit"), "{text}");
+
+    // Rays and hits count: four million of them take 240 MB.
+    place.write("many.npy", npy_of(1, "'<f4'", false, "(4000000, 8)", &vec![0; 4_000_000 * 32]));
+    let cast = |memory: &str, any: &str| {
+        format!("cast plant.rpk --rays many.npy -o part.npz --threads 2 --memory {memory} {any}")
+    };
+    place.fail(&cast("200MiB", ""), &["--memory: 200 MiB is too little for this scene", "at least 2"]);
+    place.succeed(&cast("200MiB", "--any"));
+    let refused = "--accuracy: fast keeps a record";
+    place.fail(&cast("1GiB", "--accuracy fast"), &[refused]);
+    let mut headed = npy_of(1, "'<f4'", false, "(1000000000000, 8)", &[0; 64]);
+    headed.truncate(192);
+    let mut piped = place.raypack("cast plant.rpk --rays /dev/stdin -o a.npz --memory 1GiB");
+    let output = piped.write_stdin(headed).assert().code(1).get_output().clone();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("--memory: 1024 MiB is too little"), "{message}");
+}
+
 #[test]
 fn the_report_says_how_it_went() {
     let place = square();

@@ -15,5 +15,5 @@ mod header;
 mod read;
 mod write;
 
-pub use read::{read_rays, read_rays_from};
+pub use read::{RayFile, read_rays, read_rays_from};
 pub use write::{write_hits, write_occluded};

@@ -58,15 +58,7 @@ impl Layout {
 /// The file cannot be read, is no `.npy` file, is cut short, or holds an array of another shape or type:
 /// the message says what to do in NumPy.
 pub fn read_rays(path: impl AsRef<Path>) -> Result<Vec<Ray>> {
-    let path = path.as_ref();
-    let unreadable = |source| Error::Read { path: path.into(), source };
-    let file = File::open(path).map_err(unreadable)?;
-    let metadata = file.metadata().map_err(unreadable)?;
-    if metadata.is_dir() {
-        return Err(unreadable(io::ErrorKind::IsADirectory.into()));
-    }
-    // Of a pipe, the length is not known beforehand.
-    read_rays_from(file, metadata.is_file().then_some(metadata.len()), path)
+    RayFile::open(path.as_ref())?.read()
 }
 
 /// The same from anything that gives a file's bytes: `length` of them, if that is known, so that an array
@@ -75,43 +67,101 @@ pub fn read_rays(path: impl AsRef<Path>) -> Result<Vec<Ray>> {
 ///
 /// # Errors
 /// As for [`read_rays`].
-pub fn read_rays_from(mut source: impl Read, length: Option<u64>, path: &Path) -> Result<Vec<Ray>> {
-    let malformed = |message: String| Error::malformed(path, message);
-    let failed = |error: io::Error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => malformed("truncated: the file ends before its array does".into()),
+pub fn read_rays_from(source: impl Read, length: Option<u64>, path: &Path) -> Result<Vec<Ray>> {
+    RayFile::new(source, length, path)?.read()
+}
+
+/// A `.npy` file of rays whose header has been read: it says how many there are.
+#[derive(Debug)]
+pub struct RayFile<'a, R> {
+    source: R,
+    layout: Layout,
+    count: usize,
+    /// Whether all of them are there, as far as the file's length tells.
+    is_whole: bool,
+    path: &'a Path,
+}
+
+impl<'a> RayFile<'a, File> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// As for [`read_rays`], as far as the header shows it.
+    pub fn open(path: &'a Path) -> Result<Self> {
+        let unreadable = |source| Error::Read { path: path.into(), source };
+        let file = File::open(path).map_err(unreadable)?;
+        let metadata = file.metadata().map_err(unreadable)?;
+        if metadata.is_dir() {
+            return Err(unreadable(io::ErrorKind::IsADirectory.into()));
+        }
+        // Of a pipe, the length is not known beforehand.
+        Self::new(file, metadata.is_file().then_some(metadata.len()), path)
+    }
+}
+
+impl<'a, R: Read> RayFile<'a, R> {
+    fn new(mut source: R, length: Option<u64>, path: &'a Path) -> Result<Self> {
+        let malformed = |message: String| Error::malformed(path, message);
+        let (header, header_size) =
+            Header::read(&mut source).map_err(|error| failed(path, error))?.map_err(malformed)?;
+        let layout = Layout::of(&header).map_err(malformed)?;
+
+        let bytes = layout.rays.checked_mul((COLUMNS * FLOAT) as u64);
+        let left = length.map(|length| length.saturating_sub(header_size));
+        if left.is_some_and(|left| bytes.is_none_or(|bytes| bytes > left)) {
+            let whole = left.unwrap_or_default() / (COLUMNS * FLOAT) as u64;
+            return Err(malformed(format!(
+                "truncated: the header announces {} rays, but there is room for {whole}; save the array again",
+                layout.rays
+            )));
+        }
+        let count = bytes.and_then(|_| usize::try_from(layout.rays).ok());
+        let count = count.ok_or_else(|| too_many(path, layout))?;
+        Ok(Self { source, layout, count, is_whole: left.is_some(), path })
+    }
+
+    /// How many rays there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Reads them.
+    ///
+    /// # Errors
+    /// As for [`read_rays`].
+    pub fn read(self) -> Result<Vec<Ray>> {
+        let Self { mut source, layout, count, is_whole, path } = self;
+        let mut rays = Vec::new();
+        if is_whole {
+            rays.try_reserve_exact(count).map_err(|_| too_many(path, layout))?;
+        }
+        if layout.fortran_order {
+            read_columns(&mut source, count, layout.big_endian, &mut rays)
+        } else {
+            read_rows(&mut source, count, layout.big_endian, &mut rays)
+        }
+        .map_err(|error| match error.kind() {
+            io::ErrorKind::OutOfMemory => too_many(path, layout),
+            _ => failed(path, error),
+        })?;
+        Ok(rays)
+    }
+}
+
+/// Why a file cannot be read on.
+fn failed(path: &Path, error: io::Error) -> Error {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => {
+            Error::malformed(path, "truncated: the file ends before its array does")
+        }
         _ => Error::Read { path: path.into(), source: error },
-    };
+    }
+}
 
-    let (header, header_size) = Header::read(&mut source).map_err(failed)?.map_err(malformed)?;
-    let layout = Layout::of(&header).map_err(malformed)?;
-
-    let bytes = layout.rays.checked_mul((COLUMNS * FLOAT) as u64);
-    let left = length.map(|length| length.saturating_sub(header_size));
-    if left.is_some_and(|left| bytes.is_none_or(|bytes| bytes > left)) {
-        let whole = left.unwrap_or_default() / (COLUMNS * FLOAT) as u64;
-        return Err(malformed(format!(
-            "truncated: the header announces {} rays, but there is room for {whole}; save the array again",
-            layout.rays
-        )));
-    }
-    let too_many = || {
-        malformed(format!(
-            "{} rays of 32 bytes are more than the memory holds; cast them in parts",
-            layout.rays
-        ))
-    };
-    let count = usize::try_from(layout.rays).map_err(|_| too_many())?;
-    let mut rays = Vec::new();
-    if left.is_some() {
-        rays.try_reserve_exact(count).map_err(|_| too_many())?;
-    }
-    if layout.fortran_order {
-        read_columns(&mut source, count, layout.big_endian, &mut rays)
-    } else {
-        read_rows(&mut source, count, layout.big_endian, &mut rays)
-    }
-    .map_err(|error| if error.kind() == io::ErrorKind::OutOfMemory { too_many() } else { failed(error) })?;
-    Ok(rays)
+fn too_many(path: &Path, layout: Layout) -> Error {
+    let message =
+        format!("{} rays of 32 bytes are more than the memory holds; cast them in parts", layout.rays);
+    Error::malformed(path, message)
 }
 
 /// Rows of a C-ordered array.

@@ -4,7 +4,7 @@ use super::header::Header;
 use crate::error::Result;
 use crate::files::write_whole;
 use crate::geometry::Hit;
-use crate::scene::Surface;
+use crate::scene::{Look, Surface};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
@@ -31,7 +31,8 @@ const MISS: i64 = -1;
 /// [`Error::Write`](crate::Error::Write); nothing is left behind then.
 pub fn write_hits(path: &Path, hits: &[Hit], surface: &impl Surface) -> Result<()> {
     let id = |hit: &Hit| if hit.is_hit() { i64::from(hit.primitive) } else { MISS };
-    let geometry = |hit: &Hit| if hit.is_hit() { surface.material(hit.primitive).into() } else { MISS };
+    let reader = surface.reader();
+    let geometry = |hit: &Hit| if hit.is_hit() { reader.material(hit.primitive).into() } else { MISS };
     let all = hits.len() as u64;
     write_whole(path, |file| {
         let mut archive = ZipWriter::new(file);
