@@ -161,6 +161,32 @@ impl<T: NoUninit + AnyBitPattern> Spooled<T> {
     pub fn scattered(&self, places: &[u32]) -> io::Result<Vec<T>> {
         scattered(places, |first, into| self.read(first, into))
     }
+
+    /// The values at the places that the corners of some triangles name.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of_corners(&self, corners: &[[u32; 3]]) -> io::Result<Vec<[T; 3]>> {
+        /// So many values are read for each that is wanted, if they lie together.
+        const DENSE: usize = 4;
+        let all = corners.as_flattened();
+        let (Some(&first), Some(&last)) = (all.iter().min(), all.iter().max()) else {
+            return Ok(Vec::new());
+        };
+        let span = (last - first) as usize + 1;
+        if span <= DENSE * all.len() {
+            let mut values = vec![T::zeroed(); span];
+            self.read(first as usize, &mut values)?;
+            let value = |place: u32| values[(place - first) as usize];
+            return Ok(corners.iter().map(|corners| corners.map(value)).collect());
+        }
+        let mut places = all.to_vec();
+        places.sort_unstable();
+        places.dedup();
+        let values = self.scattered(&places)?;
+        let value = |place: u32| values[places.binary_search(&place).expect("all were read")];
+        Ok(corners.iter().map(|corners| corners.map(value)).collect())
+    }
 }
 
 /// Values that lie so close together, in bytes, are read at once, with what is between them.

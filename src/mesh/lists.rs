@@ -10,9 +10,6 @@ pub(super) trait Lists {
     /// A list.
     type Of<T: Pod>: List<T>;
 
-    /// Whether there is room for what triangles' corners have beside their places: what is not in memory has none.
-    const ATTRIBUTES: bool;
-
     /// An empty list.
     ///
     /// # Errors
@@ -42,12 +39,16 @@ pub(super) trait List<T: Copy> {
     }
 }
 
+/// What readers say of a list that could not be begun.
+pub(super) fn no_room(error: io::Error) -> String {
+    format!("there is no room for what it holds: {error}")
+}
+
 /// Lists in memory.
 pub(super) struct InMemory;
 
 impl Lists for InMemory {
     type Of<T: Pod> = Vec<T>;
-    const ATTRIBUTES: bool = true;
 
     fn list<T: Pod>(&self) -> io::Result<Vec<T>> {
         Ok(Vec::new())
@@ -74,7 +75,6 @@ pub(super) struct InFiles(pub PathBuf);
 
 impl Lists for InFiles {
     type Of<T: Pod> = Spool<T>;
-    const ATTRIBUTES: bool = false;
 
     fn list<T: Pod>(&self) -> io::Result<Spool<T>> {
         Spool::new(&self.0)

@@ -114,7 +114,7 @@ fn write_records(out: &mut Out<'_, impl Write + Seek>, mesh: &Mesh) -> io::Resul
 }
 
 /// What is wrong with pictures that went missing on the way to the file.
-fn missing(images: &[Image], written: &[ImageMeta]) -> Vec<String> {
+pub(super) fn missing(images: &[Image], written: &[ImageMeta]) -> Vec<String> {
     let was_there = |image: &Image| !matches!(image.source, ImageSource::Missing(_));
     let lost = images.iter().zip(written).filter(|(image, _)| was_there(image));
     lost.filter_map(|(_, written)| match written {

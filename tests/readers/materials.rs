@@ -1,14 +1,22 @@
 //! The MTL files of an OBJ, and the pictures that they name.
 
-use super::{Folder, SQUARE, read};
+use super::{Folder, SQUARE, read, same_in_files};
 use raypack::Vec3;
 use raypack::mesh::{self, Channel, Colors, ImageSource, Loaded, Material};
+use std::path::PathBuf;
 
 /// What an OBJ of two triangles, `a` and `b`, makes of `a.mtl`.
 fn with_materials(folder: &Folder, text: impl AsRef<[u8]>) -> Loaded {
     folder.put("a.mtl", text);
     let file = format!("mtllib a.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n");
-    mesh::read(folder.put("a.obj", file)).unwrap_or_else(|e| panic!("{e}"))
+    read_both(folder.put("a.obj", file))
+}
+
+/// Reads a file, to memory and to files.
+fn read_both(path: PathBuf) -> Loaded {
+    let loaded = mesh::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    same_in_files(&path, &loaded);
+    loaded
 }
 
 fn materials(loaded: &Loaded) -> &[Material] {
@@ -23,7 +31,7 @@ fn materials_color_what_follows_them() {
     folder.put("two words.mtl", materials);
     let faces = "f 1 2 3\nusemtl\tred one\nf 1 3 4\no x\nf 1 2 4\nusemtl grey\nf 2 3 4\n";
     let path = folder.put("a.obj", format!("mtllib two words.mtl\n{SQUARE}{faces}"));
-    let loaded = mesh::read(path).unwrap();
+    let loaded = read_both(path);
     let colors: Vec<Vec3> = (0..4).map(|i| loaded.mesh.color(i, 0.2, 0.3)).collect();
     assert_eq!(colors, [Vec3::splat(0.7), Vec3::X, Vec3::X, Vec3::splat(0.5)]);
     let Colors::PerMaterial { materials, .. } = &loaded.mesh.colors else { panic!() };
@@ -38,7 +46,7 @@ fn material_files_are_found_behind_backslashes_and_in_lists() {
     folder.put("b.mtl", "newmtl b\nKd 0 1 0");
     let libraries = "mtllib sub\\a.mtl\nmtllib none.mtl b.mtl\n";
     let faces = "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
-    let loaded = mesh::read(folder.put("a.obj", format!("{libraries}{SQUARE}{faces}"))).unwrap();
+    let loaded = read_both(folder.put("a.obj", format!("{libraries}{SQUARE}{faces}")));
     assert_eq!((loaded.mesh.color(0, 0.0, 0.0), loaded.mesh.color(1, 0.0, 0.0)), (Vec3::X, Vec3::Y));
     assert_eq!(loaded.report.missing_material_files, ["none.mtl"]);
 }
@@ -49,7 +57,7 @@ fn missing_and_broken_materials_are_said_and_not_fatal() {
     folder.put("bad.mtl", b"newmtl \xe4\nKd 0.1 zwei 0.3\nKd\nnewmtl\nmap_Kd\n");
     let faces = "usemtl wood\nf 1 2 3\nusemtl wood\nf 1 3 4\n";
     let file = format!("mtllib gone.mtl\nmtllib bad.mtl\n{SQUARE}{faces}");
-    let loaded = mesh::read(folder.put("a.obj", file)).unwrap();
+    let loaded = read_both(folder.put("a.obj", file));
     assert_eq!(
         loaded.report.summary(),
         "4 MTL lines not understood; material file not found: gone.mtl; material not defined: wood"
@@ -82,7 +90,7 @@ fn a_name_means_what_the_file_named_last_says() {
     folder.put("one.mtl", "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0\n");
     folder.put("two.mtl", "newmtl a\nKd 0 1 0\n");
     let faces = "mtllib one.mtl\nusemtl a\nf 1 2 3\nmtllib two.mtl\nusemtl a\nf 1 2 3\nmtllib one.mtl\nusemtl a\nf 1 2 3\n";
-    let loaded = mesh::read(folder.put("a.obj", format!("{SQUARE}{faces}"))).unwrap();
+    let loaded = read_both(folder.put("a.obj", format!("{SQUARE}{faces}")));
     let colors: Vec<Vec3> = (0..3).map(|i| loaded.mesh.color(i, 0.2, 0.3)).collect();
     assert_eq!(colors, [Vec3::X, Vec3::Y, Vec3::X]);
     assert_eq!(materials(&loaded).len(), 3, "each file is read once");
@@ -96,7 +104,7 @@ fn pictures_are_found_once_and_not_opened() {
     folder.put("sub/b.mtl", "newmtl b\nmap_Kd leaf.png\nmap_d leaf.png\nmap_Ks ../textures/old wood.png\n");
     folder.put("a.mtl", "newmtl a\nmap_Kd -s 2 2 1 textures\\Old Wood.png\nmap_Ke \"C:\\x\\old wood.png\"\n");
     let file = format!("mtllib a.mtl\nmtllib sub\\b.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n");
-    let loaded = mesh::read(folder.put("a.obj", file)).unwrap();
+    let loaded = read_both(folder.put("a.obj", file));
     let files = [wood, leaf].map(|path| ImageSource::File(path.canonicalize().unwrap()));
     assert_eq!(loaded.mesh.images.iter().map(|image| image.source.clone()).collect::<Vec<_>>(), files);
     assert_eq!(loaded.mesh.images[0].name, "textures\\Old Wood.png", "as it is written");

@@ -1,6 +1,6 @@
 //! Wavefront OBJ.
 
-use super::{Folder, SQUARE, assert_says, read, refusal};
+use super::{Folder, SQUARE, assert_says, read, refusal, same_in_files};
 use raypack::Vec3;
 use raypack::mesh::{self, Attributes, Colors, Normal};
 
@@ -86,7 +86,10 @@ fn vertex_colors_count_unless_materials_do_more() {
     let colored = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n";
     let of = |material: &str| {
         let file = format!("mtllib a.mtl\n{colored}usemtl {material}\nf 1 2 3\n");
-        mesh::read(folder.put("a.obj", file)).unwrap()
+        let path = folder.put("a.obj", file);
+        let loaded = mesh::read(&path).unwrap();
+        same_in_files(&path, &loaded);
+        loaded
     };
     let plain = of("plain");
     assert!(matches!(plain.mesh.colors, Colors::PerVertex(_)));
@@ -182,7 +185,7 @@ fn bad_indices_are_refused_with_their_line() {
 fn bad_vertices_are_refused_with_their_line() {
     assert_says(&refusal("a.obj", "v 0 0 0\nv 1 x 0\n"), &["line 2", "position"]);
     assert_says(&refusal("a.obj", "v 0 0\n"), &["line 1", "position"]);
-    assert_says(&refusal("a.obj", "v 0 0 0 1 0\n"), &["line 1", "color"]);
+    assert_says(&refusal("a.obj", "v 0 0 0 1 0\n"), &["line 1", "colour"]);
     assert_says(&refusal("a.obj", "v 0 0 0 1 0 red\n"), &["line 1", "colour"]);
     assert_says(&refusal("a.obj", b"v 0 0 \xb2\n"), &["line 1"]);
 }
@@ -206,4 +209,34 @@ fn nothing_to_render_is_refused() {
     assert_says(&refusal("a.obj", SQUARE), &["no triangles"]);
     assert_says(&refusal("a.obj", format!("{SQUARE}f 1 2 2\n")), &["no triangles", "twice"]);
     assert_says(&refusal("a.obj", [0_u8; 4096]), &["no triangles"]);
+}
+
+#[test]
+fn the_tobj_crate_reads_the_same_triangles() {
+    // Faces of all sizes in groups and materials, indices of both kinds, texture coordinates and normals.
+    let mut file = String::from("vt 0 0\nvt 1 0.5\nvn 0 0 1\n");
+    for face in 0..300_usize {
+        file += ["o a\n", "usemtl x\n", "g b c\n", "s 1\n", ""][face % 5];
+        let size = 3 + face % 4;
+        (0..size).for_each(|i| file += &format!("v {face} {} {}.25e-1\n", i * i, face * i));
+        let corner = |i: usize| match face % 3 {
+            0 => format!(" {}", i as i64 - size as i64),
+            1 => format!(" {}/1", i as i64 - size as i64),
+            _ => format!(" {}/2/1", i as i64 - size as i64),
+        };
+        file += &format!("f{}\n", (0..size).map(corner).collect::<String>());
+        if face > 10 {
+            file += &format!("f {} 1 {}\n", face + 7, 2 * face);
+        }
+    }
+    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
+    let (models, _) = tobj::load_obj_buf(&mut file.as_bytes(), &options, |_| Ok(Default::default())).unwrap();
+    let corners_of = |tobj::Model { mesh, .. }: &tobj::Model| {
+        let (positions, triangles) = (mesh.positions.as_chunks::<3>().0, mesh.indices.as_chunks::<3>().0);
+        triangles.iter().map(|t| t.map(|i| Vec3::from_array(positions[i as usize]))).collect::<Vec<_>>()
+    };
+    let expected: Vec<[Vec3; 3]> = models.iter().flat_map(corners_of).collect();
+    let mesh = read("a.obj", file).mesh;
+    assert_eq!(mesh.triangles.len(), expected.len());
+    assert!((0..).zip(&expected).all(|(i, corners)| mesh.corners(i) == *corners));
 }

@@ -19,10 +19,6 @@ use tracing::info;
 /// What the process takes beside all that is counted: its own code, threads, what an allocator keeps.
 const PROCESS: usize = 32 << 20;
 
-/// Bytes of a mesh's arrays: a vertex and a triangle, with colours by triangle.
-const VERTEX: usize = size_of::<glam::Vec3>();
-const TRIANGLE: usize = size_of::<[u32; 3]>() + 3;
-
 /// What was built.
 pub struct Large {
     pub model: ModelReport,
@@ -41,10 +37,9 @@ pub fn is_called_for(
     params: &BuildParams,
 ) -> Result<bool> {
     let (Some(limit), [model]) = (options.limit()?, models) else { return Ok(false) };
-    let Some((vertices, triangles)) = spooled::announced(model.as_ref()) else { return Ok(false) };
-    let (vertices, triangles) = (vertices as usize, triangles as usize);
-    let mesh = vertices.saturating_mul(VERTEX).saturating_add(triangles.saturating_mul(TRIANGLE));
-    let in_memory = mesh.saturating_add(params.peak_bytes(triangles)).saturating_add(PROCESS);
+    let Some(announced) = spooled::announced(model.as_ref()) else { return Ok(false) };
+    let (mesh, tree) = (announced.mesh_bytes() as usize, params.peak_bytes(announced.triangles as usize));
+    let in_memory = mesh.saturating_add(tree).saturating_add(PROCESS);
     Ok(in_memory > limit)
 }
 

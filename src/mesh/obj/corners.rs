@@ -1,32 +1,48 @@
 //! Texture coordinates and normals of an OBJ file, and of its faces' corners.
 
-use super::feed::parse_f32;
+use super::lines::{parse_f32, words};
+use crate::mesh::lists::{InFiles, InMemory, List, Lists};
 use crate::mesh::{Attributes, Normal, ReadReport};
+use crate::spool::{Spool, Spooled};
+use bytemuck::Pod;
 use glam::Vec3;
+use std::io;
 
 /// What `vt` and `vn` lines have given, and what faces have made of it.
-///
-/// tobj never sees any of it: it would take a vertex for several wherever two triangles differ in these, and panic
-/// at indices out of range. That its triangles are these, in this order, is sure: it makes the same fan of each
-/// face, one face after the other, and leaves none out that has three corners or more.
-#[derive(Default)]
-pub(super) struct Corners {
-    coordinates: Vec<[f32; 2]>,
-    normals: Vec<Normal>,
-    /// Of each triangle up to the last that has any; empty if none has.
-    attributes: Vec<Attributes>,
-    /// How many triangles there have been.
-    triangles: usize,
-    /// The corners of the face that is read, and whether one of them has anything.
-    face: Vec<([f32; 2], Normal)>,
-    named: bool,
+pub(in crate::mesh) struct Corners<L: Lists> {
+    coordinates: L::Of<[f32; 2]>,
+    normals: L::Of<Normal>,
+    /// Of each triangle up to the last that names any; empty if none does.
+    named: L::Of<Named>,
+    /// The corners of the face that is read, and whether one of them names anything.
+    face: Vec<[u32; 2]>,
+    names_any: bool,
     bad_coordinates: u64,
     bad_normals: u64,
 }
 
-impl Corners {
+/// The places of texture coordinates that a triangle's corners name, and those of normals, or [`NOTHING`].
+type Named = [[u32; 3]; 2];
+
+/// What a corner has that names nothing.
+const NOTHING: u32 = u32::MAX;
+
+impl<L: Lists> Corners<L> {
+    /// None yet.
+    pub(super) fn new(lists: &L) -> io::Result<Self> {
+        Ok(Self {
+            coordinates: lists.list()?,
+            normals: lists.list()?,
+            named: lists.list()?,
+            face: Vec::new(),
+            names_any: false,
+            bad_coordinates: 0,
+            bad_normals: 0,
+        })
+    }
+
     /// A `vt` line, trimmed: one to three numbers, of which the third does not count. What is no finite number is 0.
-    pub fn coordinates(&mut self, rest: &[u8]) {
+    pub(super) fn coordinates(&mut self, rest: &[u8]) {
         let [u, v] = numbers(rest);
         // Of a picture that is a line, the second is left out.
         let is_line = !rest.iter().any(u8::is_ascii_whitespace);
@@ -35,7 +51,7 @@ impl Corners {
     }
 
     /// A `vn` line: three numbers. What has no direction is no normal.
-    pub fn normal(&mut self, rest: &[u8]) {
+    pub(super) fn normal(&mut self, rest: &[u8]) {
         let normal = numbers(rest).map(|x| x.unwrap_or(f32::NAN));
         let normal = Normal::encode(Vec3::from_array(normal));
         self.bad_normals += u64::from(normal == Normal::NONE);
@@ -43,71 +59,116 @@ impl Corners {
     }
 
     /// Begins a face.
-    pub fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.face.clear();
-        self.named = false;
+        self.names_any = false;
     }
 
     /// Adds a corner to the face: what follows its vertex, `/vt/vn`, each of which may be missing.
-    pub fn corner(&mut self, rest: Option<&[u8]>) -> Result<(), String> {
+    pub(super) fn corner(&mut self, rest: Option<&[u8]>) -> Result<(), String> {
         let Some(rest) = rest else {
-            self.face.push(([0.0; 2], Normal::NONE));
+            self.face.push([NOTHING; 2]);
             return Ok(());
         };
         let mut parts = rest.split(|&b| b == b'/');
-        let coordinates = match parts.next() {
-            Some(text) if !text.is_empty() => {
-                self.coordinates[resolve(text, self.coordinates.len(), &COORDINATES)?]
-            }
-            _ => [0.0; 2],
+        let mut place = |count, counted| match parts.next() {
+            Some(text) if !text.is_empty() => resolve(text, count, counted),
+            _ => Ok(NOTHING),
         };
-        let normal = match parts.next() {
-            Some(text) if !text.is_empty() => self.normals[resolve(text, self.normals.len(), &NORMALS)?],
-            _ => Normal::NONE,
-        };
+        let coordinates = place(self.coordinates.len(), &COORDINATES)?;
+        let normal = place(self.normals.len(), &NORMALS)?;
         if parts.next().is_some() {
             return Err(format!("corner {} of a face has more than three numbers", shown(rest)));
         }
-        self.named |= rest.iter().any(|&b| b != b'/');
-        self.face.push((coordinates, normal));
+        self.names_any |= rest.iter().any(|&b| b != b'/');
+        self.face.push([coordinates, normal]);
         Ok(())
     }
 
-    /// Ends the face: its triangles are a fan around the first corner.
-    pub fn end(&mut self) {
+    /// Ends the face, before which there have been so many triangles: its own are a fan around the first corner.
+    pub(super) fn end(&mut self, triangles: usize) {
         let Some(([first, second], rest)) = self.face.split_first_chunk() else { return };
-        if self.named && !rest.is_empty() {
-            self.attributes.resize(self.triangles, Attributes::NONE);
-            let mut last = second;
-            for next in rest {
-                let corners = [first, last, next];
-                self.attributes.push(Attributes { uv: corners.map(|c| c.0), normals: corners.map(|c| c.1) });
-                last = next;
-            }
+        if !self.names_any || rest.is_empty() {
+            return;
         }
-        self.triangles += rest.len();
+        self.named.fill([[NOTHING; 3]; 2], triangles);
+        let mut last = second;
+        for next in rest {
+            self.named.push([0, 1].map(|which| [first, last, next].map(|corner| corner[which])));
+            last = next;
+        }
     }
 
-    /// How many triangles have ended.
-    pub fn triangles(&self) -> usize {
-        self.triangles
-    }
-
-    /// One record a triangle, or none at all; adds to the report what was bad.
-    pub fn finish(mut self, report: &mut ReadReport) -> Vec<Attributes> {
+    /// Adds to the report what was bad.
+    pub(super) fn count_bad(&self, report: &mut ReadReport) {
         report.bad_texture_coordinates += self.bad_coordinates;
         report.bad_normals += self.bad_normals;
-        if !self.attributes.is_empty() {
-            self.attributes.resize(self.triangles, Attributes::NONE);
-            self.attributes.shrink_to_fit();
-        }
-        self.attributes
     }
+}
+
+impl Corners<InMemory> {
+    /// One record for each of so many triangles, or none at all.
+    pub(super) fn attributes(mut self, triangles: usize) -> Vec<Attributes> {
+        if self.named.is_empty() {
+            return Vec::new();
+        }
+        self.named.fill([[NOTHING; 3]; 2], triangles);
+        let coordinates = |place: u32| self.coordinates.get(place as usize).copied().unwrap_or_default();
+        let normal = |place: u32| self.normals.get(place as usize).copied().unwrap_or(Normal::NONE);
+        let of = |[uv, normals]: &Named| Attributes { uv: uv.map(coordinates), normals: normals.map(normal) };
+        self.named.iter().map(of).collect()
+    }
+}
+
+impl Corners<InFiles> {
+    /// The same, in a file; `None` in place of no records.
+    ///
+    /// # Errors
+    /// Something cannot be written, or read.
+    pub(in crate::mesh) fn attributes(
+        mut self,
+        triangles: usize,
+        lists: &InFiles,
+    ) -> io::Result<Option<Spooled<Attributes>>> {
+        if self.named.is_empty() {
+            return Ok(None);
+        }
+        self.named.fill([[NOTHING; 3]; 2], triangles);
+        let (coordinates, normals) = (self.coordinates.finish()?, self.normals.finish()?);
+        let mut attributes: Spool<Attributes> = lists.list()?;
+        self.named.finish()?.each(|_, named| {
+            let places = |which: usize| named.iter().map(|named| named[which]).collect::<Vec<_>>();
+            let uv = looked_up(&coordinates, &places(0), [0.0; 2])?;
+            let normals = looked_up(&normals, &places(1), Normal::NONE)?;
+            for (uv, normals) in uv.into_iter().zip(normals) {
+                attributes.push(Attributes { uv, normals });
+            }
+            Ok::<(), io::Error>(())
+        })?;
+        attributes.finish().map(Some)
+    }
+}
+
+/// The values at some places of a list; `nothing` where there is none.
+fn looked_up<T: Pod>(list: &Spooled<T>, places: &[[u32; 3]], nothing: T) -> io::Result<Vec<[T; 3]>> {
+    // A place that is read anyway stands for those that are not there.
+    let Some(&some) = places.as_flattened().iter().find(|&&place| place != NOTHING) else {
+        return Ok(vec![[nothing; 3]; places.len()]);
+    };
+    let or = |place: u32| if place == NOTHING { some } else { place };
+    let known: Vec<_> = places.iter().map(|places| places.map(or)).collect();
+    let mut values = list.of_corners(&known)?;
+    for (value, &place) in values.as_flattened_mut().iter_mut().zip(places.as_flattened()) {
+        if place == NOTHING {
+            *value = nothing;
+        }
+    }
+    Ok(values)
 }
 
 /// The first numbers of a line, where they are finite.
 fn numbers<const N: usize>(rest: &[u8]) -> [Option<f32>; N] {
-    let mut words = rest.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+    let mut words = words(rest);
     std::array::from_fn(|_| words.next().and_then(parse_f32).filter(|x| x.is_finite()))
 }
 
@@ -124,7 +185,7 @@ const NORMALS: Counted = Counted { one: "normal", many: "normals" };
 
 /// What a face's index means, counted from 0, of `count` that come before it: it counts from 1, or from the end if it
 /// is negative.
-pub(super) fn resolve(text: &[u8], count: usize, counted: &Counted) -> Result<usize, String> {
+pub(super) fn resolve(text: &[u8], count: usize, counted: &Counted) -> Result<u32, String> {
     let Counted { one, many } = counted;
     let bad = |what: &str| format!("{one} {} of a face {what}", shown(text));
     let index = match std::str::from_utf8(text).ok().and_then(|t| t.parse::<i64>().ok()) {
@@ -135,6 +196,7 @@ pub(super) fn resolve(text: &[u8], count: usize, counted: &Counted) -> Result<us
     };
     index
         .filter(|&i| i < count)
+        .and_then(|i| u32::try_from(i).ok())
         .ok_or_else(|| bad(&format!("is out of range, {count} {many} come before it")))
 }
 
@@ -147,9 +209,13 @@ fn shown(text: &[u8]) -> String {
 mod tests {
     use super::*;
 
+    fn corners() -> Corners<InMemory> {
+        Corners::new(&InMemory).expect("memory")
+    }
+
     #[test]
     fn numbers_that_are_none_are_zeros_and_no_normals() {
-        let mut corners = Corners::default();
+        let mut corners = corners();
         for line in ["0.25 0.5 7", "0.75", "nan 1", "1 inf", "", "1 x"] {
             corners.coordinates(line.as_bytes());
         }
@@ -163,24 +229,21 @@ mod tests {
         assert_eq!(corners.normals[0].decode(), Vec3::Z);
         assert!(corners.normals[1..].iter().all(|&normal| normal == Normal::NONE));
         let mut report = ReadReport::default();
-        assert!(corners.finish(&mut report).is_empty());
+        corners.count_bad(&mut report);
+        assert!(corners.attributes(7).is_empty());
         assert_eq!((report.bad_texture_coordinates, report.bad_normals), (4, 5));
     }
 
     #[test]
     fn faces_without_leave_their_places() {
-        let mut corners = Corners::default();
+        let mut corners = corners();
         corners.coordinates(b"1 2");
-        for face in [[None; 4], [Some(&b"1"[..]), None, Some(b"/"), None]] {
+        for (face, before) in [([None; 4], 0), ([Some(&b"1"[..]), None, Some(b"/"), None], 2)] {
             corners.begin();
             face.iter().for_each(|corner| corners.corner(*corner).expect("in range"));
-            corners.end();
+            corners.end(before);
         }
-        corners.begin();
-        (0..3).for_each(|_| corners.corner(None).expect("nothing"));
-        corners.end();
-        assert_eq!(corners.triangles(), 5);
-        let attributes = corners.finish(&mut ReadReport::default());
+        let attributes = corners.attributes(5);
         assert_eq!(attributes.len(), 5);
         assert_eq!([0, 1, 4].map(|i| attributes[i]), [Attributes::NONE; 3]);
         assert_eq!([2, 3].map(|i| attributes[i].uv), [[[1.0, 2.0], [0.0; 2], [0.0; 2]]; 2]);

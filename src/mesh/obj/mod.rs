@@ -1,12 +1,14 @@
-//! Wavefront OBJ with its MTL files, through `tobj`.
+//! Wavefront OBJ with its MTL files.
 //!
-//! tobj does the parsing of vertices and faces; `feed` stands before it, because tobj alone misreads or panics on
-//! files that are common: an error names no line, vertex colours shift where only some vertices have them, a tab
-//! after a keyword is fatal, so is one Latin-1 letter in a comment, and a texture index out of range can make it
-//! panic. Normals and texture coordinates never reach it, they would make several vertices of one; `corners` keeps
-//! them by triangle, and what this saves pays for the checks. MTL files do not reach it either: a line `Kd 0.5` makes
-//! it panic, and it knows no options before a picture's name. `mtl` reads their lines, and `material` says what they
-//! mean.
+//! The reader is our own. `tobj`, the best-kept crate, was used first. It makes several vertices of one that is used
+//! in several groups, it has no way to put what it reads into files, and it misreads or panics on files that are
+//! common: an error names no line, vertex colours shift where only some vertices have them, a tab after a keyword is
+//! fatal, so is one Latin-1 letter in a comment, and `Kd 0.5` or a texture index out of range can make it panic. It is
+//! the judge in the tests.
+//!
+//! `reader` takes the file line by line, to lists in memory or in files; `vertices` and `corners` are what it fills.
+//! Normals and texture coordinates are a triangle's: a vertex stays one, whatever its faces say of it. `mtl` reads
+//! the lines of MTL files, and `material` says what they mean.
 //!
 //! Polygons become fans around their first corner. That is right for convex polygons and for
 //! concave ones that the first corner sees whole; others come out with overlapping triangles, as
@@ -16,24 +18,41 @@
 //! and counted. Smoothing groups say nothing that normals do not; a file without normals is drawn flat.
 
 mod corners;
-mod feed;
 mod images;
 mod library;
+mod lines;
 mod material;
 mod mtl;
+mod reader;
 mod texture;
+mod vertices;
 
 use super::color::{self, Colors};
+use super::lists::{InMemory, Lists};
 use super::material::{DEFAULT_DIFFUSE, Material};
-use super::{Mesh, ReadReport};
-use feed::{Extras, Feed};
+use super::spooled::Announced;
+use super::{Image, Mesh, ReadReport};
+pub(super) use corners::Corners;
 use glam::Vec3;
 use library::Library;
+use lines::{Lines, split_keyword, words};
+use reader::{Reader, UNKNOWN};
 use std::path::Path;
 
-/// No normals and texture coordinates ever reach tobj, so the position alone is a vertex.
-const OPTIONS: tobj::LoadOptions =
-    tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+/// What an OBJ file holds, as it stands there.
+pub(super) struct Raw<L: Lists> {
+    pub positions: L::Of<Vec3>,
+    pub triangles: L::Of<[u32; 3]>,
+    /// Vertices' colours, sRGB-encoded, if they count.
+    pub of_vertices: Option<L::Of<[f32; 3]>>,
+    /// Materials, if they count, and that of each triangle.
+    pub of_materials: Option<(Vec<Material>, L::Of<u32>)>,
+    /// Whether some triangles' material is not among these: see [`known`].
+    pub any_unknown: bool,
+    /// The pictures that materials name.
+    pub images: Vec<Image>,
+    pub corners: Corners<L>,
+}
 
 /// Parses an OBJ file's bytes; MTL files are looked up beside `path`.
 pub(super) fn parse(
@@ -42,96 +61,58 @@ pub(super) fn parse(
     report: &mut ReadReport,
     progress: &dyn Fn(f32),
 ) -> Result<Mesh, String> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    // Colours on some vertices only would shift tobj's list of them: then every vertex gets one.
-    let mut all_colored = false;
-    loop {
-        let mut feed = Feed::new(bytes, Library::beside(folder), all_colored, progress);
-        // No `mtllib` reaches tobj.
-        let parsed = tobj::load_obj_buf(&mut feed, &OPTIONS, |_| Ok(Default::default()));
-        if let Some(message) = feed.error.take() {
-            return Err(message);
+    let mut raw = parse_to(&InMemory, bytes, path, report, progress)?;
+    let attributes = raw.corners.attributes(raw.triangles.len());
+    let mut mesh =
+        Mesh { positions: raw.positions, triangles: raw.triangles, attributes, ..Default::default() };
+    if let Some(colors) = raw.of_vertices {
+        mesh.colors = Colors::PerVertex(color::quantize(&colors));
+    } else if let Some((mut materials, mut of_triangle)) = raw.of_materials.take() {
+        if raw.any_unknown {
+            let known = known(&mut materials);
+            of_triangle.iter_mut().for_each(|material| *material = known(*material));
         }
-        if !all_colored && feed.colored_vertices > 0 && feed.colored_vertices < feed.vertices() {
-            all_colored = true;
-            continue;
-        }
-        let (models, _) = parsed.map_err(|e| format!("line {}: {e}", feed.line))?;
-        if feed.vertices() > u64::from(u32::MAX) {
-            return Err(format!(
-                "{} vertices, at most {} are possible; split the model",
-                feed.vertices(),
-                u32::MAX
-            ));
-        }
-        feed.refuse_non_finite()?;
-        return merge(models, feed.finish(report), report);
-    }
-}
-
-/// All models as one mesh, with what its triangles have.
-fn merge(models: Vec<tobj::Model>, extras: Extras, report: &mut ReadReport) -> Result<Mesh, String> {
-    let Extras { colored_vertices, mut materials, images, runs, triangles, attributes } = extras;
-    let found: usize = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
-    if found != triangles {
-        return Err(format!(
-            "its faces make {triangles} triangles, but {found} were found; please report this"
-        ));
-    }
-    let vertices = models.iter().map(|m| m.mesh.positions.len() / 3).sum();
-    let known = |(_, material): &(usize, Option<u32>)| material.is_some();
-    let by_material = runs.iter().any(known)
-        && (colored_vertices == 0
-            || runs.iter().filter_map(|run| run.1).any(|m| outdoes_colors(&materials[m as usize])));
-    let colored = colored_vertices > 0 && !by_material;
-    report.unused_vertex_colors += if colored { 0 } else { colored_vertices };
-    let mut mesh = Mesh {
-        positions: Vec::with_capacity(vertices),
-        triangles: Vec::with_capacity(triangles),
-        attributes,
-        ..Default::default()
-    };
-    let mut vertex_colors = Vec::with_capacity(if colored { vertices } else { 0 });
-    for tobj::Model { mesh: model, .. } in models {
-        let base = mesh.positions.len() as u32;
-        mesh.positions.extend(model.positions.as_chunks().0.iter().map(|&p| Vec3::from_array(p)));
-        mesh.triangles.extend(model.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| base + i)));
-        if colored {
-            vertex_colors.extend_from_slice(model.vertex_color.as_chunks::<3>().0);
-        }
-    }
-    if colored {
-        mesh.colors = Colors::PerVertex(color::quantize(&vertex_colors));
-    } else if by_material {
-        let of_triangle = of_triangles(&runs, triangles, &mut materials);
         mesh.colors = Colors::PerMaterial { materials, of_triangle };
-        mesh.images = images;
+        mesh.images = raw.images;
     }
     Ok(mesh)
 }
 
-/// Whether what a material says beside its colour counts for more than vertices' colours.
-fn outdoes_colors(material: &Material) -> bool {
-    let Material { unlit, reflects, transmission, opacity, emission, maps, .. } = material;
-    *unlit
-        || *reflects
-        || *opacity < 1.0
-        || [transmission, emission].iter().any(|light| **light != Vec3::ZERO)
-        || maps.all().next().is_some()
+/// Parses an OBJ file's bytes, to lists of a kind.
+pub(super) fn parse_to<L: Lists>(
+    lists: &L,
+    bytes: &[u8],
+    path: &Path,
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+) -> Result<Raw<L>, String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut reader = Reader::new(lists, Library::beside(folder))?;
+    reader.read(Lines::new(bytes, progress))?;
+    let raw = reader.finish(report);
+    raw.corners.count_bad(report);
+    Ok(raw)
 }
 
-/// The material of each triangle. One that is nowhere defined is added if any triangle has none.
-fn of_triangles(runs: &[(usize, Option<u32>)], triangles: usize, materials: &mut Vec<Material>) -> Vec<u32> {
+/// Adds a material for triangles that none is known of; what gives them that.
+pub(super) fn known(materials: &mut Vec<Material>) -> impl Fn(u32) -> u32 + use<> {
     let none = materials.len() as u32;
-    let mut of_triangle = Vec::with_capacity(triangles);
-    let mut current = none;
-    for &(first, material) in runs {
-        of_triangle.resize(first, current);
-        current = material.unwrap_or(none);
+    materials.push(Material::matt("(none)", DEFAULT_DIFFUSE));
+    move |material| if material == UNKNOWN { none } else { material }
+}
+
+/// How much is in an OBJ file, whether or not it can be read.
+pub(super) fn count(bytes: &[u8], progress: &dyn Fn(f32)) -> Announced {
+    let mut found = Announced { vertices: 0, triangles: 0, attributes: false };
+    let mut lines = Lines::new(bytes, progress);
+    while let Some(line) = lines.take() {
+        let (keyword, rest) = split_keyword(line.trim_ascii());
+        match keyword {
+            b"v" => found.vertices += 1,
+            b"f" => found.triangles += (words(rest).count() as u64).saturating_sub(2),
+            b"vt" | b"vn" => found.attributes = true,
+            _ => {}
+        }
     }
-    of_triangle.resize(triangles, current);
-    if of_triangle.contains(&none) {
-        materials.push(Material::matt("(none)", DEFAULT_DIFFUSE));
-    }
-    of_triangle
+    found
 }

@@ -1,6 +1,6 @@
 //! The lines of a MTL file.
 
-use super::feed::{parse_f32, split_keyword};
+use super::lines::{parse_f32, split_keyword};
 use super::texture::Texture;
 use glam::Vec3;
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! What a `map_` line of a MTL file says: options, and the name of a picture.
 
-use super::feed::{parse_f32, split_keyword};
+use super::lines::{parse_f32, split_keyword};
 use crate::mesh::{Channel, Map};
 
 /// A picture as a line names it, before it is looked for.

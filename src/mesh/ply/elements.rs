@@ -1,10 +1,10 @@
 //! From numbers to vertices, triangles and colours.
 
 use super::body::Source;
-use super::header::{Element, Kind, Scalar};
+use super::header::{Element, Kind, Property, Scalar};
 use super::looks::Looks;
 use crate::mesh::color;
-use crate::mesh::lists::{List, Lists};
+use crate::mesh::lists::{List, Lists, no_room};
 use crate::mesh::material::DEFAULT_DIFFUSE;
 use glam::Vec3;
 
@@ -117,6 +117,11 @@ fn slot(name: &str, kind: Kind) -> Slot {
     }
 }
 
+/// Whether a property of vertices is part of a texture coordinate or a normal.
+pub(super) fn is_attribute(property: &Property) -> bool {
+    matches!(slot(&property.name, property.kind), Slot::Coordinate(_) | Slot::Normal(_))
+}
+
 /// One item's values.
 #[derive(Default)]
 struct Item {
@@ -177,14 +182,14 @@ pub(super) fn skip<S: Source>(
 
 /// No list could be begun.
 fn no_list(error: std::io::Error) -> ItemError {
-    (0, format!("there is no room for what it holds: {error}"))
+    (0, no_room(error))
 }
 
 /// Element `vertex`.
 pub(super) struct Vertices<L: Lists> {
     pub positions: L::Of<Vec3>,
     pub shades: Shades<L>,
-    pub looks: Looks,
+    pub looks: Looks<L>,
 }
 
 impl<L: Lists> Vertices<L> {
@@ -204,7 +209,7 @@ impl<L: Lists> Vertices<L> {
         if let Some(kind) = layout.color {
             self.shades.begin(lists, kind, 0)?;
         }
-        let has_all = |slots: &[Slot]| L::ATTRIBUTES && slots.iter().all(|&slot| layout.has(slot));
+        let has_all = |slots: &[Slot]| slots.iter().all(|&slot| layout.has(slot));
         let with_coordinates = has_all(&[Slot::Coordinate(0), Slot::Coordinate(1)]);
         let with_normals = has_all(&[Slot::Normal(0), Slot::Normal(1), Slot::Normal(2)]);
         let mut item = Item::default();

@@ -9,8 +9,8 @@
 //! numeric type; index lists named `vertex_indices` or `vertex_index` of any integer type; colours
 //! `red green blue` or `diffuse_red …` on vertices, faces or strips. A colour per face goes before
 //! one per vertex. Texture coordinates `u v`, `s t` or `texture_u texture_v` and normals `nx ny nz` of vertices come
-//! along where the mesh is in memory. Everything else is skipped. Faces of more than three corners become fans around
-//! their first corner (right for convex ones); every second triangle of a strip is turned round.
+//! along. Everything else is skipped. Faces of more than three corners become fans around their first corner (right
+//! for convex ones); every second triangle of a strip is turned round.
 
 mod body;
 mod elements;
@@ -23,7 +23,8 @@ pub use parts::PartWriter;
 pub use write::write;
 
 use super::color;
-use super::lists::{InMemory, Lists};
+use super::lists::{InMemory, Lists, no_room};
+use super::spooled::Announced;
 use super::{Colors, Mesh, ReadReport};
 use body::{Ascii, Binary, Source};
 pub(super) use elements::Shades;
@@ -59,14 +60,17 @@ pub(super) struct Raw<L: Lists> {
     pub triangles: L::Of<[u32; 3]>,
     pub of_faces: Shades<L>,
     pub of_vertices: Shades<L>,
-    pub looks: Looks,
+    pub looks: Looks<L>,
 }
 
-/// The numbers of vertices and faces that a PLY file's header announces; `None` if it is no PLY file.
-pub(super) fn announced(bytes: &[u8]) -> Option<(u64, u64)> {
+/// What a PLY file's header announces; `None` if it is no PLY file.
+pub(super) fn announced(bytes: &[u8]) -> Option<Announced> {
     let header = Header::parse(bytes).ok()?;
-    let count = |name| header.elements.iter().filter(|element| element.name == name).map(|e| e.count).sum();
-    Some((count("vertex"), count("face")))
+    let named = |name: &'static str| header.elements.iter().filter(move |element| element.name == name);
+    let count = |name| named(name).map(|element| element.count).sum();
+    let mut properties = named("vertex").flat_map(|element| &element.properties);
+    let attributes = properties.any(elements::is_attribute);
+    Some(Announced { vertices: count("vertex"), triangles: count("face"), attributes })
 }
 
 /// Parses a PLY file's bytes, to lists of a kind.
@@ -94,13 +98,12 @@ fn read_body<L: Lists, S: Source>(
 ) -> Result<Raw<L>, String> {
     let size = source.remaining().max(1) as f32;
     let vertex_count = header.vertex_count()?;
-    let no_list = |error| format!("there is no room for what it holds: {error}");
     let mut vertices = Vertices {
-        positions: lists.list::<Vec3>().map_err(no_list)?,
+        positions: lists.list::<Vec3>().map_err(no_room)?,
         shades: Shades::<L>::None,
-        looks: Looks::default(),
+        looks: Looks::new(lists).map_err(no_room)?,
     };
-    let mut faces = Faces::<L>::new(vertex_count, lists.list().map_err(no_list)?);
+    let mut faces = Faces::<L>::new(vertex_count, lists.list().map_err(no_room)?);
     for element in &header.elements {
         check_room(element, &source)?;
         let mut row = |index: u64, source: &S| {

@@ -15,8 +15,9 @@ mod surfaces;
 use super::checksum::BLOCK;
 use super::meta::{ColorMeta, ENGINE, Meta};
 use super::out::Out;
+use super::pictures;
 use super::section::Kind;
-use super::writer::Written;
+use super::writer::{Written, missing};
 use crate::error::{Error, Result};
 use crate::files::{folder_of, write_or};
 use crate::geometry::Aabb;
@@ -144,14 +145,14 @@ pub fn build(
             stats: stats.clone(),
             colors: color_meta(&mesh.colors),
             uses: surfaces.uses,
-            // No file that is read piece by piece has any.
-            attributes: false,
-            normals: false,
-            images: Vec::new(),
+            attributes: mesh.attributes.is_some(),
+            normals: surfaces.normals,
+            images: pictures::write(&mut out, &mesh.images).map_err(cannot)?,
         };
+        let missing_images = missing(&mesh.images, &meta.images);
         let meta = serde_json::to_vec_pretty(&meta).expect("it is plain data");
         out.section(Kind::Meta, &meta).map_err(cannot)?;
-        let written = out.finish().map_err(cannot)?;
+        let written = Written { missing_images, ..out.finish().map_err(cannot)? };
         progress.set(1.0);
         Ok(Built { written, stats, peak, parts, zero_area_triangles: surfaces.zero_area })
     })

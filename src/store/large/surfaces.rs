@@ -1,12 +1,13 @@
 //! The sections that a mesh makes: its own arrays, and its triangles' records.
 
 use super::super::out::Out;
+use super::super::record::SurfaceRecord;
 use super::super::section::Kind;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Scale;
-use crate::mesh::Material;
 use crate::mesh::spooled::{SpooledColors, SpooledMesh};
+use crate::mesh::{Attributes, Material};
 use crate::spool::Spooled;
 use bytemuck::Pod;
 use rayon::prelude::*;
@@ -22,6 +23,8 @@ pub struct Surfaces {
     pub zero_area: u64,
     /// How many triangles each of the materials has.
     pub uses: Vec<u64>,
+    /// Whether any triangle has normals.
+    pub normals: bool,
 }
 
 /// Triangles that a task looks at.
@@ -49,17 +52,24 @@ pub fn write<W: Write + Seek>(
             out.begin(Kind::CornerColors)?;
             by_task(
                 &mesh.triangles,
-                |corners| of_corners(colors, corners),
+                |corners| colors.of_corners(corners),
                 |colors| out.put(colors.as_flattened().as_flattened()),
             )?;
             out.end()?;
         }
         SpooledColors::PerMaterial { materials, of_triangle } => {
-            copy(out, Kind::MaterialOfTriangle, of_triangle)?;
+            // The records have them, where there are records.
+            if mesh.attributes.is_none() {
+                copy(out, Kind::MaterialOfTriangle, of_triangle)?;
+            }
             uses = count(of_triangle, materials.len())?;
             write_emitters(out, materials, of_triangle, &uses)?;
         }
     }
+    let normals = match &mesh.attributes {
+        Some(attributes) => write_records(out, attributes, &mesh.colors)?,
+        None => false,
+    };
     progress(0.4);
 
     let record = |corners: [glam::Vec3; 3]| {
@@ -67,7 +77,7 @@ pub fn write<W: Write + Seek>(
         Triangle::new(if scale.is_none() { corners } else { scale.apply(&corners) })
     };
     let records = |corners: &[[u32; 3]]| {
-        Ok(of_corners(&mesh.positions, corners)?.into_iter().map(record).collect::<Vec<_>>())
+        Ok(mesh.positions.of_corners(corners)?.into_iter().map(record).collect::<Vec<_>>())
     };
     let (mut bounds, mut zero_area, mut done) = (Aabb::EMPTY, 0, 0);
     out.begin(Kind::Triangles)?;
@@ -81,7 +91,7 @@ pub fn write<W: Write + Seek>(
         out.put(bytemuck::cast_slice(&records))
     })?;
     let section = out.end()?;
-    Ok(Surfaces { records: section.offset, bounds, zero_area, uses })
+    Ok(Surfaces { records: section.offset, bounds, zero_area, uses, normals })
 }
 
 /// How many triangles each of so many materials has.
@@ -114,6 +124,30 @@ fn write_emitters<W: Write + Seek>(
     out.end().map(drop)
 }
 
+/// Writes the section `surface-records`; whether any of them has normals.
+fn write_records<W: Write + Seek>(
+    out: &mut Out<'_, W>,
+    attributes: &Spooled<Attributes>,
+    colors: &SpooledColors,
+) -> io::Result<bool> {
+    let mut normals = false;
+    let mut materials = Vec::new();
+    out.begin(Kind::SurfaceRecords)?;
+    attributes.each(|first, some| {
+        materials.clear();
+        materials.resize(some.len(), 0);
+        if let SpooledColors::PerMaterial { of_triangle, .. } = colors {
+            of_triangle.read(first, &mut materials)?;
+        }
+        normals |= some.iter().any(Attributes::has_normals);
+        let record = |(&material, &attributes): (&u32, &Attributes)| SurfaceRecord { material, attributes };
+        let records: Vec<SurfaceRecord> = materials.iter().zip(some).map(record).collect();
+        out.put(bytemuck::cast_slice(&records))
+    })?;
+    out.end()?;
+    Ok(normals)
+}
+
 /// Makes a list a section.
 fn copy<W: Write + Seek, T: Pod>(out: &mut Out<'_, W>, kind: Kind, list: &Spooled<T>) -> io::Result<()> {
     out.begin(kind)?;
@@ -131,29 +165,4 @@ fn by_task<T: Send>(
         let made: Vec<io::Result<Vec<T>>> = some.par_chunks(TASK).map(&make).collect();
         made.into_iter().try_for_each(|made| give(made?))
     })
-}
-
-/// The values that the corners of some triangles have.
-fn of_corners<T: Pod>(list: &Spooled<T>, corners: &[[u32; 3]]) -> io::Result<Vec<[T; 3]>> {
-    /// So many values are read for each that is wanted, if they lie together.
-    const DENSE: usize = 4;
-    let vertices = corners.as_flattened();
-    let (Some(&first), Some(&last)) = (vertices.iter().min(), vertices.iter().max()) else {
-        return Ok(Vec::new());
-    };
-    let span = (last - first) as usize + 1;
-    if span <= DENSE * vertices.len() {
-        let mut values = vec![T::zeroed(); span];
-        list.read(first as usize, &mut values)?;
-        return Ok(corners
-            .iter()
-            .map(|corners| corners.map(|vertex| values[(vertex - first) as usize]))
-            .collect());
-    }
-    let mut places = vertices.to_vec();
-    places.sort_unstable();
-    places.dedup();
-    let values = list.scattered(&places)?;
-    let value = |vertex: u32| values[places.binary_search(&vertex).expect("all were read")];
-    Ok(corners.iter().map(|corners| corners.map(value)).collect())
 }

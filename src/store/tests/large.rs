@@ -34,15 +34,15 @@ fn sections_are_the_same_to_the_byte() {
         mesh
     };
     let large = shapes::soup(150_000, 3);
-    // What is read piece by piece has no attributes, but it may have lamps.
+    // Materials with lamps among them, with pictures, texture coordinates and normals, and without.
     let folder = tempfile::tempdir().expect("a folder");
-    let mut lit = enriched(meshes().remove(3), folder.path());
-    (lit.attributes, lit.images) = (Vec::new(), Vec::new());
+    let rich = enriched(meshes().remove(3), folder.path());
+    let mut lit = Mesh { attributes: Vec::new(), images: Vec::new(), ..rich.clone() };
     if let Colors::PerMaterial { materials, .. } = &mut lit.colors {
         materials.iter_mut().for_each(|material| material.maps = Maps::default());
     }
     assert!(!lit.colors.emitters().is_empty());
-    for mesh in meshes().into_iter().chain([scaled(1e37), scaled(1e-33), large, lit]) {
+    for mesh in meshes().into_iter().chain([scaled(1e37), scaled(1e-33), large, lit, rich]) {
         let tree = build(&mesh);
         let (whole, parts) = (Place::new(), Place::new());
         whole.write(&mesh, &tree).expect("written");

@@ -1,0 +1,223 @@
+//! Meshes in files, for who cannot have them in memory.
+//!
+//! A PLY or OBJ file is read from its beginning to its end, and what it holds goes to files on the way (`whole`);
+//! checking it is some passes over these (`check`). What comes out is the mesh that [`read`](super::read()) gives,
+//! triangle by triangle.
+
+mod behind;
+mod check;
+mod whole;
+
+use super::lists::InFiles;
+use super::read::map;
+use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, obj, ply};
+use crate::error::{Error, Result};
+use crate::geometry::Aabb;
+use crate::spool::{Spool, Spooled};
+use behind::Behind;
+use bytemuck::Pod;
+use check::{Fault, check};
+use glam::Vec3;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+pub(super) use whole::Whole;
+
+/// A [`Mesh`] whose arrays lie in files.
+#[derive(Debug)]
+pub struct SpooledMesh {
+    /// Vertex positions, all finite.
+    pub positions: Spooled<Vec3>,
+    /// Three vertices for each triangle.
+    pub triangles: Spooled<[u32; 3]>,
+    /// What colour the triangles have.
+    pub colors: SpooledColors,
+    /// Texture coordinates and normals by triangle, if the model has any.
+    pub attributes: Option<Spooled<Attributes>>,
+    /// The pictures that materials' maps name.
+    pub images: Vec<Image>,
+    /// The box around all vertices.
+    pub bounds: Aabb,
+}
+
+/// [`Colors`] that lie in files.
+#[derive(Debug)]
+pub enum SpooledColors {
+    /// One colour for everything.
+    Uniform(Vec3),
+    /// One sRGB-encoded colour a triangle.
+    PerTriangle(Spooled<[u8; 3]>),
+    /// One sRGB-encoded colour a vertex.
+    PerVertex(Spooled<[u8; 3]>),
+    /// Named materials, and for each triangle an index into them.
+    PerMaterial {
+        /// The materials.
+        materials: Vec<Material>,
+        /// One index a triangle.
+        of_triangle: Spooled<u32>,
+    },
+}
+
+impl SpooledMesh {
+    /// A copy of a mesh, in files in `folder`, which vanish with it.
+    ///
+    /// # Errors
+    /// There is no room.
+    pub fn of_mesh(mesh: &Mesh, folder: &Path) -> io::Result<Self> {
+        let colors = match &mesh.colors {
+            Colors::Uniform(color) => SpooledColors::Uniform(*color),
+            Colors::PerTriangle(colors) => SpooledColors::PerTriangle(spooled(colors, folder)?),
+            Colors::PerVertex(colors) => SpooledColors::PerVertex(spooled(colors, folder)?),
+            Colors::PerMaterial { materials, of_triangle } => SpooledColors::PerMaterial {
+                materials: materials.clone(),
+                of_triangle: spooled(of_triangle, folder)?,
+            },
+        };
+        let attributes = (!mesh.attributes.is_empty()).then(|| spooled(&mesh.attributes, folder));
+        Ok(Self {
+            positions: spooled(&mesh.positions, folder)?,
+            triangles: spooled(&mesh.triangles, folder)?,
+            colors,
+            attributes: attributes.transpose()?,
+            images: mesh.images.clone(),
+            bounds: mesh.bounds(),
+        })
+    }
+
+    /// A copy in memory.
+    ///
+    /// # Errors
+    /// The files cannot be read.
+    pub fn to_mesh(&self) -> io::Result<Mesh> {
+        let colors = match &self.colors {
+            SpooledColors::Uniform(color) => Colors::Uniform(*color),
+            SpooledColors::PerTriangle(colors) => Colors::PerTriangle(colors.to_vec()?),
+            SpooledColors::PerVertex(colors) => Colors::PerVertex(colors.to_vec()?),
+            SpooledColors::PerMaterial { materials, of_triangle } => {
+                Colors::PerMaterial { materials: materials.clone(), of_triangle: of_triangle.to_vec()? }
+            }
+        };
+        Ok(Mesh {
+            positions: self.positions.to_vec()?,
+            triangles: self.triangles.to_vec()?,
+            colors,
+            attributes: self.attributes.as_ref().map_or(Ok(Vec::new()), Spooled::to_vec)?,
+            images: self.images.clone(),
+        })
+    }
+}
+
+/// A list in a file.
+fn spooled<T: Pod>(list: &[T], folder: &Path) -> io::Result<Spooled<T>> {
+    let mut spool = Spool::new(folder)?;
+    spool.extend_from_slice(list);
+    spool.finish()
+}
+
+/// What is known of a model before it is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Announced {
+    /// Vertices in the file.
+    pub vertices: u64,
+    /// Triangles; a polygon of a PLY file counts as one.
+    pub triangles: u64,
+    /// Whether triangles may have texture coordinates or normals.
+    pub attributes: bool,
+}
+
+impl Announced {
+    /// About how many bytes its mesh takes in memory.
+    pub fn mesh_bytes(&self) -> u64 {
+        /// An index of a material, or a colour.
+        const COLOR: u64 = 4;
+        let attributes = if self.attributes { size_of::<Attributes>() as u64 } else { 0 };
+        let triangle = size_of::<[u32; 3]>() as u64 + COLOR + attributes;
+        let vertices = self.vertices.saturating_mul(size_of::<Vec3>() as u64);
+        vertices.saturating_add(self.triangles.saturating_mul(triangle))
+    }
+}
+
+/// The kinds of files that are read piece by piece.
+#[derive(Clone, Copy)]
+enum Format {
+    Ply,
+    Obj,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?;
+        match () {
+            () if ending.eq_ignore_ascii_case("ply") => Some(Self::Ply),
+            () if ending.eq_ignore_ascii_case("obj") => Some(Self::Obj),
+            () => None,
+        }
+    }
+}
+
+/// How much a PLY file announces in its header, and how much is in an OBJ file, which is looked through for that;
+/// `None` for other files, which are read into memory only, and for what cannot be read.
+pub fn announced(path: &Path) -> Option<Announced> {
+    match Format::of(path)? {
+        Format::Ply => {
+            /// Headers are shorter.
+            const BEGINNING: u64 = 1 << 16;
+            let mut bytes = Vec::new();
+            File::open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
+            ply::announced(&bytes)
+        }
+        Format::Obj => {
+            let bytes = map(path).ok()?;
+            let behind = Behind::new(&bytes);
+            Some(obj::count(&bytes, &|part| behind.release(part)))
+        }
+    }
+}
+
+/// Reads a PLY or OBJ file to files in `folder`, which vanish with the mesh. `progress` is told now and then what part
+/// (0 to 1) is behind. Takes a bit for each vertex, some megabytes, and an OBJ file's materials.
+///
+/// # Errors
+/// As [`read`](super::read()), or there is no room in `folder`. Panics if it is a file of another kind.
+pub fn read(path: &Path, folder: &Path, progress: &dyn Fn(f32)) -> Result<(SpooledMesh, ReadReport)> {
+    let malformed = |message: String| Error::malformed(path, message);
+    let bytes = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
+    let lists = InFiles(folder.into());
+    let mut report = ReadReport::default();
+    let behind = Behind::new(&bytes);
+    let told = |part: f32| {
+        behind.release(part);
+        progress(0.7 * part);
+    };
+    let whole = match Format::of(path).expect("it is a kind that is read piece by piece") {
+        Format::Ply => {
+            let raw = ply::parse_to(&lists, &bytes, &mut report, &told).map_err(malformed)?;
+            Whole::of_ply(raw, &lists, &mut report)
+        }
+        Format::Obj => {
+            let raw = obj::parse_to(&lists, &bytes, path, &mut report, &told).map_err(malformed)?;
+            Whole::of_obj(raw, &lists)
+        }
+    };
+    drop(bytes);
+    let whole = whole.map_err(|source| Error::Write { path: folder.into(), source })?;
+    let mesh = whole.checked(&lists, path, &mut report, &|part| progress(0.7 + 0.3 * part))?;
+    Ok((mesh, report))
+}
+
+impl Whole {
+    /// The mesh that it is, by the policy of [`check`](super::check). `path` is what errors name.
+    pub(super) fn checked(
+        self,
+        lists: &InFiles,
+        path: &Path,
+        report: &mut ReadReport,
+        progress: &dyn Fn(f32),
+    ) -> Result<SpooledMesh> {
+        let (vertices, faces) = (self.positions.len(), self.triangles.len());
+        check(self, &lists.0, report, progress).map_err(|fault| match fault {
+            Fault::Io(source) => Error::Write { path: lists.0.clone(), source },
+            Fault::Unusable(unusable) => Error::malformed(path, unusable.message(vertices, faces)),
+        })
+    }
+}
