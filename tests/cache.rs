@@ -141,6 +141,23 @@ fn a_flight_tells_what_each_cache_did() {
             assert!(cold_loads <= blocks, "{row}");
         }
     }
+    // As in the paper: a table for each share and way of loading, of a row a frame and a column a policy.
+    let tables = report["tables"].as_array().expect("a list");
+    assert_eq!(tables.len(), 2 * 2 * 2, "shares, ways of loading, cold and warm");
+    for table in tables {
+        assert_eq!(table["policies"], serde_json::json!(["lru", "sieve"]), "{table}");
+        let rows = table["rays_per_s"].as_array().expect("a list");
+        let is_whole = |row: &serde_json::Value| row.as_array().is_some_and(|rates| rates.len() == 2);
+        assert!(rows.len() == 3 && rows.iter().all(is_whole), "{table}");
+    }
+    assert_eq!(report["paper"]["rays_per_s"], serde_json::json!([3e3, 12e3]));
+    for line in [
+        "rays/s by frame, 40 % in memory, sync, cold",
+        "frame  ",
+        "3 to 12 thousand rays/s, 21 s for a frame",
+    ] {
+        assert!(text.contains(line), "{line:?} is not in:\n{text}");
+    }
     let plot = String::from_utf8(place.read("flight.svg")).expect("text");
     assert!(plot.contains("40 % in memory, warm") && plot.contains("sieve async"), "it is a plot");
 }

@@ -8,11 +8,13 @@
 //! The system keeps files in its own memory, where a read costs some microseconds instead of what the disk
 //! takes. [`CacheOptions::direct`] goes past that; reports say which it was.
 
+mod by_frame;
 pub mod minimum;
 #[cfg(feature = "accuracy")]
 pub mod plot;
 mod report;
 
+pub use by_frame::{FrameTable, PAPER, Paper};
 pub use report::{FrameRow, Report, Row};
 
 use crate::cache::policy::Replacement;
@@ -182,7 +184,9 @@ impl Flight {
             raypack: env!("CARGO_PKG_VERSION"),
             build: machine::build_profile(),
             date: machine::date(),
+            tables: FrameTable::all(&rows),
             rows,
+            paper: PAPER,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What flights through caches took, as tables and as JSON.
 
-use super::Trial;
+use super::{FrameTable, Paper, Trial};
 use crate::cache::policy::Replacement;
 use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
 use crate::geometry::Accuracy;
@@ -182,11 +182,11 @@ pub struct Report {
     pub date: String,
     /// The resident scene's, and the caches'.
     pub rows: Vec<Row>,
+    /// The caches' rays a second by frame.
+    pub tables: Vec<FrameTable>,
+    /// What all this is compared with.
+    pub paper: Paper,
 }
-
-/// What the seed paper reports for its power plant of 12.7 M triangles, in rays a second: the least and the
-/// greatest of its caches.
-const PAPER: [f64; 2] = [3e3, 12e3];
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -252,7 +252,7 @@ impl fmt::Display for Report {
                 if row.warm { "warm" } else { "cold" }.into(),
                 figure(row.rays_per_s * 1e-6),
                 format!("{:.2}", row.rays_per_s / resident),
-                format!("{:.0}", row.rays_per_s / PAPER[1]),
+                format!("{:.0}", row.rays_per_s / self.paper.rays_per_s[1]),
                 of(format!("{:.2}", row.hit_ratio * 100.0)),
                 of(row.loads.to_string()),
                 of(row.minimum.to_string()),
@@ -268,46 +268,10 @@ impl fmt::Display for Report {
         writeln!(
             f,
             "\nleast: what the policy that knows the future would have read (Belady's MIN, on the uses of that \
-             flight)\nx paper: of the 12 thousand rays/s that Portelli's power plant of 12.7 M triangles reached; \
-             its least was {} thousand",
-            PAPER[0] * 1e-3
+             flight)\nx paper: of the {:.0} thousand rays/s that the paper's fastest cache reached",
+            self.paper.rays_per_s[1] * 1e-3
         )?;
-        self.by_frame(f)
-    }
-}
-
-impl Report {
-    /// Rays a second by frame, as the seed paper's tables have it: a row a frame, a column a cache.
-    fn by_frame(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut budgets: Vec<f64> = self.rows.iter().skip(1).map(|row| row.budget).collect();
-        budgets.dedup();
-        for budget in budgets {
-            for warm in [false, true] {
-                let rows: Vec<&Row> = self
-                    .rows
-                    .iter()
-                    .filter(|r| r.policy.is_some() && r.budget == budget && r.warm == warm)
-                    .collect();
-                let pass = if warm { "warm" } else { "cold" };
-                writeln!(f, "\nMrays/s by frame, {:.0} % in memory, {pass}", budget * 100.0)?;
-                let name = |row: &&Row| {
-                    let name = row.name();
-                    name.split(' ').skip(2).take(2).collect::<Vec<_>>().join(" ")
-                };
-                let mut lines = vec![
-                    std::iter::once("frame".to_string()).chain(rows.iter().map(name)).collect::<Vec<_>>(),
-                ];
-                for frame in 0..self.frames {
-                    let rate = |row: &&Row| {
-                        row.frames.get(frame).map_or("-".into(), |f| figure(f.rays as f64 / f.seconds * 1e-6))
-                    };
-                    lines.push(
-                        std::iter::once((frame + 1).to_string()).chain(rows.iter().map(rate)).collect(),
-                    );
-                }
-                f.write_str(&grid(&lines))?;
-            }
-        }
-        Ok(())
+        self.tables.iter().try_for_each(|table| write!(f, "\n{table}"))?;
+        write!(f, "\n{}", self.paper)
     }
 }
