@@ -275,8 +275,23 @@ fn models_larger_than_the_memory_given_are_built_piece_by_piece() {
     built_within(&place, "build plant.ply -o parts.rpk", 120);
     place.succeed("info parts.rpk --verify");
     same_sections(&place, "whole.rpk", "parts.rpk");
+    // A scene file is a model as well, and a generated one goes without that.
+    built_within(&place, "build whole.rpk -o again.rpk", 120);
+    same_sections(&place, "whole.rpk", "again.rpk");
+    let plant = "generate plant --triangles 400k --seed 5 -o plant.rpk";
+    let generated = built_within(&place, plant, 120);
+    assert_eq!(generated["triangles"], report(&place, "info whole.rpk")["triangles"]);
+    place.succeed("info plant.rpk --verify");
+    same_sections(&place, "whole.rpk", "plant.rpk");
     let files = place.files();
-    assert_eq!(files, ["parts.rpk", "plant.ply", "whole.rpk"], "nothing else is left");
+    assert_eq!(
+        files,
+        ["again.rpk", "parts.rpk", "plant.ply", "plant.rpk", "whole.rpk"],
+        "nothing else is left"
+    );
+    place.fail(&format!("{plant} --memory 60MiB"), &["--memory: building ", "MiB: give "]);
+    place.fail("generate plant -o a.ply --memory 1GiB", &["--memory: only a .rpk has a tree"]);
+    place.fail("generate plant -o a.obj", &["a.obj", ".ply", ".rpk"]);
     let refused = ["--memory: building ", "triangles piece by piece takes", "MiB: give "];
     place.fail("build plant.ply -o parts.rpk --memory 60MiB", &refused);
 }
@@ -317,6 +332,9 @@ fn obj_models_larger_than_the_memory_given_are_built_piece_by_piece() {
     let built = built_within(&place, "build hills.obj -o parts.rpk", 120);
     place.succeed("info parts.rpk --verify");
     same_sections(&place, "whole.rpk", "parts.rpk");
+    built_within(&place, "build whole.rpk -o again.rpk", 120);
+    same_sections(&place, "whole.rpk", "again.rpk");
+    fs::remove_file(place.path("again.rpk")).expect("it was built");
     let read = |report: &Value| {
         let mut model = report["models"][0].clone();
         model.as_object_mut().expect("a model").remove("read_seconds");

@@ -1,10 +1,17 @@
-//! `raypack generate plant -o plant.ply`: models of any size.
+//! `raypack generate plant -o plant.ply`: models of any size, with their trees as `.rpk`.
 
+use super::build::describe_parts;
+use super::build::large::build_mesh;
+use super::options::BuildOptions;
 use super::progress::Bar;
 use super::report::{Json, Lines, bytes, duration, grouped};
+use super::scene::{BuildMemory, describe_tree};
 use crate::error::{Error, Result};
-use crate::files::check_writable;
+use crate::files::{check_writable, folder_of};
+use crate::kdtree::TreeStats;
+use crate::mesh::generate::Size;
 use crate::mesh::generate::plant::{self, PlantParams, TRIANGLES};
+use crate::store::is_scene;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -30,9 +37,11 @@ struct PlantArgs {
     /// Which of the plants of that size
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The file: .ply (binary)
+    /// The file: .ply (binary), or .rpk, a scene file with its tree, built within --memory [default: 1GiB]
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    #[command(flatten)]
+    build: BuildOptions,
     #[command(flatten)]
     json: Json,
 }
@@ -43,9 +52,25 @@ struct Report<'a> {
     triangles: u64,
     vertices: u64,
     seed: u64,
+    /// Of generating, writing a model included.
     seconds: f64,
     bytes: u64,
+    /// What a scene file took, and what is in it.
+    #[serde(flatten)]
+    scene: Option<Scene>,
 }
+
+/// A tree that was built of the model.
+#[derive(Debug, Serialize)]
+struct Scene {
+    build_seconds: f64,
+    build_memory: BuildMemory,
+    parts: usize,
+    tree: TreeStats,
+}
+
+/// What a scene file is built in if nobody says how much: the largest plant takes less than half of it.
+const MEMORY: usize = 1 << 30;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
@@ -55,40 +80,68 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 fn plant(args: &PlantArgs) -> Result<()> {
-    let triangles = count(&args.triangles)?;
+    let params = PlantParams { triangles: count(&args.triangles)?, seed: args.seed };
+    let with_tree = is_scene(&args.output);
     let is_ply = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply"));
-    if !is_ply {
-        let expected = "a model is written as .ply";
+    if !is_ply && !with_tree {
+        let expected = "a model is written as .ply, and with its tree as .rpk";
         return Err(Error::UnknownFormat { path: args.output.clone(), expected });
+    }
+    if let Some(option) = args.build.of_trees().filter(|_| is_ply) {
+        return Err(Error::option(option, "only a .rpk has a tree; leave it out"));
     }
     if args.json.file() == Some(&args.output) {
         return Err(Error::option("--json", "this is the model's file; give another name"));
     }
     check_writable(&args.output)?;
     args.json.check()?;
+    let report = if with_tree { scene(args, params)? } else { model(args, params)? };
 
-    let start = Instant::now();
-    let bar = Bar::new("generating");
-    let params = PlantParams { triangles, seed: args.seed };
-    let plant = plant::write(&args.output, params, &|fraction| bar.set(fraction))?;
-    drop(bar);
-    let seconds = start.elapsed().as_secs_f64();
-    let size = std::fs::metadata(&args.output).map_or(0, |file| file.len());
-
-    let report = Report {
-        file: &args.output,
-        triangles: plant.triangles,
-        vertices: plant.vertices,
-        seed: args.seed,
-        seconds,
-        bytes: size,
-    };
     let mut lines = Lines::default();
     let [triangles, vertices] = [report.triangles, report.vertices].map(grouped);
     lines.add("triangles", format!("{triangles} with {vertices} vertices"));
-    lines.add("generated", format!("{}, writing included", duration(seconds)));
-    lines.add("wrote", format!("{}, {}", args.output.display(), bytes(size)));
+    let what = if with_tree { "to files" } else { "writing included" };
+    lines.add("generated", format!("{}, {what}", duration(report.seconds)));
+    if let Some(Scene { build_seconds, build_memory, parts, tree }) = &report.scene {
+        describe_parts(&mut lines, *build_seconds, *build_memory, *parts);
+        describe_tree(&mut lines, tree);
+    }
+    lines.add("wrote", format!("{}, {}", args.output.display(), bytes(report.bytes)));
     args.json.give(lines.text(), &report)
+}
+
+/// Writes the plant as a model.
+fn model(args: &PlantArgs, params: PlantParams) -> Result<Report<'_>> {
+    let start = Instant::now();
+    let bar = Bar::new("generating");
+    let Size { triangles, vertices } = plant::write(&args.output, params, &|fraction| bar.set(fraction))?;
+    let bytes = std::fs::metadata(&args.output).map_or(0, |file| file.len());
+    let seconds = start.elapsed().as_secs_f64();
+    Ok(Report { file: &args.output, triangles, vertices, seed: params.seed, seconds, bytes, scene: None })
+}
+
+/// Writes the plant with its tree.
+fn scene(args: &PlantArgs, params: PlantParams) -> Result<Report<'_>> {
+    let build = args.build.profile()?.build;
+    let limit = args.build.limit()?.unwrap_or(MEMORY);
+    let start = Instant::now();
+    let bar = Bar::new("generating");
+    let mesh = plant::spool(folder_of(&args.output), params, &|fraction| bar.set(fraction))?;
+    drop(bar);
+    let seconds = start.elapsed().as_secs_f64();
+    let (triangles, vertices) = (mesh.triangles.len() as u64, mesh.positions.len() as u64);
+    let source = format!("a plant of {} triangles, seed {}", params.triangles, params.seed);
+    let (built, build_seconds, build_memory) = build_mesh(&args.output, &mesh, &build, limit, &source)?;
+    let scene = Scene { build_seconds, build_memory, parts: built.parts, tree: built.stats };
+    Ok(Report {
+        file: &args.output,
+        triangles,
+        vertices,
+        seed: params.seed,
+        seconds,
+        bytes: built.written.bytes,
+        scene: Some(scene),
+    })
 }
 
 /// A number of triangles: digits, a decimal point if wanted, and `k` or `M`.

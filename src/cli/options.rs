@@ -67,6 +67,12 @@ impl BuildOptions {
         Ok(profile)
     }
 
+    /// The first option given that says how a tree is built.
+    pub fn of_trees(&self) -> Option<&'static str> {
+        let given = [("--preset", self.preset.is_some()), ("--memory", self.memory.is_some())];
+        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+
     /// The same for a scene, whose tree may be built already; `--memory` then says how much of it is held, for
     /// a command that can do with a part.
     ///
@@ -75,10 +81,8 @@ impl BuildOptions {
     pub fn profile_for(&self, scene: Option<&Path>, a_part_will_do: bool) -> Result<Profile> {
         let profile = self.profile()?;
         let Some(file) = scene.filter(|scene| is_scene(scene)) else { return Ok(profile) };
-        let given =
-            [("--preset", self.preset.is_some()), ("--memory", self.memory.is_some() && !a_part_will_do)];
-        match given.into_iter().find(|(_, given)| *given) {
-            Some((option, _)) => {
+        match self.of_trees().filter(|&option| option != "--memory" || !a_part_will_do) {
+            Some(option) => {
                 let message = format!(
                     "the tree in {} is built already: leave this out, or give it to raypack build",
                     file.display()

@@ -31,6 +31,7 @@ mod pictures;
 mod reader;
 mod record;
 mod section;
+mod spooled;
 mod stored;
 mod substance;
 mod writer;

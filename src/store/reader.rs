@@ -128,8 +128,13 @@ impl File {
     fn verify_blocks(&self, blocks: &[Range<usize>], progress: &(dyn Fn(f64) + Sync)) -> Result<()> {
         match first_damaged(&self.map, &self.checksums, blocks, progress) {
             None => Ok(()),
-            Some(block) => Err(Error::malformed(&self.path, damaged(&self.sections, block))),
+            Some(block) => Err(self.damaged(block)),
         }
+    }
+
+    /// What to say about a damaged block.
+    pub(super) fn damaged(&self, block: usize) -> Error {
+        Error::malformed(&self.path, damaged(&self.sections, block))
     }
 
     /// A section's elements, not checked; none if there is no such section. Panics if an element has another

@@ -8,9 +8,9 @@ use super::{Args, ModelReport};
 use crate::error::{Error, Result};
 use crate::files::folder_of;
 use crate::kdtree::{BuildParams, TreeStats};
-use crate::mesh::spooled;
-use crate::store::Written;
-use crate::store::large::{self, Progress};
+use crate::mesh::spooled::{self, SpooledMesh};
+use crate::store::large::{self, Built, Progress};
+use crate::store::{self, Written, is_scene};
 use crate::study::resident;
 use std::path::Path;
 use std::time::Instant;
@@ -37,7 +37,10 @@ pub fn is_called_for(
     params: &BuildParams,
 ) -> Result<bool> {
     let (Some(limit), [model]) = (options.limit()?, models) else { return Ok(false) };
-    let Some(announced) = spooled::announced(model.as_ref()) else { return Ok(false) };
+    let model = model.as_ref();
+    let announced =
+        if is_scene(model) { Some(store::File::open(model)?.announced()) } else { spooled::announced(model) };
+    let Some(announced) = announced else { return Ok(false) };
     let (mesh, tree) = (announced.mesh_bytes() as usize, params.peak_bytes(announced.triangles as usize));
     let in_memory = mesh.saturating_add(tree).saturating_add(PROCESS);
     Ok(in_memory > limit)
@@ -47,13 +50,42 @@ pub fn is_called_for(
 pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
     let path = &args.models[0];
     let name = path.display().to_string();
+    let folder = folder_of(&args.output);
     let start = Instant::now();
-    let bar = Bar::new("reading");
-    let (mesh, mut report) = spooled::read(path, folder_of(&args.output), &|part| bar.set(f64::from(part)))?;
-    drop(bar);
+    let (mesh, mut read_report) = if is_scene(path) {
+        (store::File::open(path)?.spooled_mesh(folder)?, None)
+    } else {
+        let bar = Bar::new("reading");
+        let (mesh, report) = spooled::read(path, folder, &|part| bar.set(f64::from(part)))?;
+        (mesh, Some(report))
+    };
     let read_seconds = start.elapsed().as_secs_f64();
     info!("read {name} in {}, to files", duration(read_seconds));
 
+    let (triangles, vertices) = (mesh.triangles.len(), mesh.positions.len());
+    let (built, seconds, memory) = build_mesh(&args.output, &mesh, params, limit, &name)?;
+    if let Some(report) = &mut read_report {
+        report.zero_area_triangles = built.zero_area_triangles;
+    }
+    Ok(Large {
+        model: ModelReport { model: name, triangles, vertices, read_seconds, read_report },
+        tree: built.stats,
+        seconds,
+        memory,
+        parts: built.parts,
+        written: built.written,
+    })
+}
+
+/// Builds the tree of a mesh in files and writes the scene file within the memory given; the seconds of that, and
+/// what memory it took. `source` says what the mesh was made of.
+pub fn build_mesh(
+    output: &Path,
+    mesh: &SpooledMesh,
+    params: &BuildParams,
+    limit: usize,
+    source: &str,
+) -> Result<(Built, f64, BuildMemory)> {
     let triangles = mesh.triangles.len();
     let least = large::least_bytes(params, triangles) + PROCESS;
     if least > limit {
@@ -66,22 +98,8 @@ pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
     }
     let start = Instant::now();
     let progress = Progress::default();
-    let work = || large::build(&args.output, &mesh, params, limit - PROCESS, &name, &progress);
+    let work = || large::build(output, mesh, params, limit - PROCESS, source, &progress);
     let built = watch("building", || progress.fraction(), work)?;
-    let seconds = start.elapsed().as_secs_f64();
-    report.zero_area_triangles = built.zero_area_triangles;
-    Ok(Large {
-        model: ModelReport {
-            model: name,
-            triangles,
-            vertices: mesh.positions.len(),
-            read_seconds,
-            read_report: Some(report),
-        },
-        tree: built.stats,
-        seconds,
-        memory: BuildMemory { announced: limit, counted: built.peak, resident: resident::peak() },
-        parts: built.parts,
-        written: built.written,
-    })
+    let memory = BuildMemory { announced: limit, counted: built.peak, resident: resident::peak() };
+    Ok((built, start.elapsed().as_secs_f64(), memory))
 }

@@ -1,6 +1,6 @@
 //! `raypack build MODEL... -o scene.rpk`: models to one scene file.
 
-mod large;
+pub mod large;
 
 use super::model::Model;
 use super::options::BuildOptions;
@@ -23,8 +23,8 @@ use std::time::Instant;
 /// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
 /// become one scene. Primitive ids run on from model to model in the order in which they are named.
 ///
-/// With --memory, a PLY model that is larger than that, with its tree, is read and built piece by piece: the same
-/// scene, in more time. What waits for its turn lies in files beside the scene file, and goes with the command.
+/// With --memory, a PLY, OBJ or .rpk model that is larger than that, with its tree, is read and built piece by piece:
+/// the same scene, in more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// The models: .obj, .ply, .stl, .gltf or .glb, or .rpk scene files, whose trees are built anew
@@ -65,7 +65,7 @@ struct Report<'a> {
 
 /// What was read of a model.
 #[derive(Debug, Serialize)]
-struct ModelReport {
+pub struct ModelReport {
     model: String,
     triangles: usize,
     vertices: usize,
@@ -196,7 +196,7 @@ fn text(report: &Report<'_>) -> String {
     describe_size(&mut lines, report.triangles as u64, report.vertices);
     match report.parts {
         None => report.build_memory.describe(&mut lines, report.build_seconds),
-        Some(parts) => describe_parts(&mut lines, report, parts),
+        Some(parts) => describe_parts(&mut lines, report.build_seconds, report.build_memory, parts),
     }
     describe_tree(&mut lines, report.tree);
     let time = report.write_seconds.map(|seconds| format!(", in {}", duration(seconds))).unwrap_or_default();
@@ -207,15 +207,15 @@ fn text(report: &Report<'_>) -> String {
     lines.text().to_owned()
 }
 
-/// What is said of a tree that was built in parts.
-fn describe_parts(lines: &mut Lines, report: &Report<'_>, parts: usize) {
-    let BuildMemory { announced, counted: held, resident } = report.build_memory;
+/// What is said of a tree that was built in parts, in so many seconds.
+pub fn describe_parts(lines: &mut Lines, seconds: f64, memory: BuildMemory, parts: usize) {
+    let BuildMemory { announced, counted: held, resident } = memory;
     let resident = resident.map(|peak| format!(", the process {} at most", bytes(peak))).unwrap_or_default();
     lines.add(
         "built",
         format!(
             "in {}, in {}; the builder held {}{resident}, of {} given",
-            duration(report.build_seconds),
+            duration(seconds),
             counted(parts as u64, "part"),
             bytes(held as u64),
             bytes(announced as u64)

@@ -20,6 +20,7 @@ mod parts;
 mod write;
 
 pub use parts::PartWriter;
+pub(super) use write::shades;
 pub use write::write;
 
 use super::color;

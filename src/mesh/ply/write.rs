@@ -74,7 +74,7 @@ pub(super) fn face(out: &mut impl Write, triangle: [u32; 3], shade: Option<[u8; 
 }
 
 /// The materials' colours as bytes.
-pub(super) fn shades(materials: &[Material]) -> Vec<[u8; 3]> {
+pub(in crate::mesh) fn shades(materials: &[Material]) -> Vec<[u8; 3]> {
     materials.iter().map(|m| color::encode(m.diffuse)).collect()
 }
 

@@ -14,6 +14,7 @@ mod layout;
 mod palette;
 mod piping;
 mod plates;
+mod spool;
 mod steel;
 mod units;
 mod vessels;
@@ -25,6 +26,7 @@ use glam::Vec3;
 use std::convert::Infallible;
 use std::ops::RangeInclusive;
 
+pub use spool::spool;
 pub use write::write;
 
 /// The numbers of triangles that a plant comes within 5 % of.
