@@ -15,7 +15,7 @@
 //! What is given up is agreement between neighbours: each side of a shared edge is decided from its
 //! own numbers, so a ray may slip between the two, or hit both.
 
-use super::{Alone, Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
+use super::{Alone, Candidate, Corners, Finds, Lanes3, RENAMED, Test, normal_in_double};
 use crate::simd::{Eight, Lanes};
 use glam::{DVec3, Vec3};
 
@@ -141,7 +141,7 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
 
 impl Alone for Lines<1, f32> {
     #[inline(always)]
-    fn sift<L: Eight>(&self, _triangles: &[&Projected; 8], _tnear: f32, _tfar: f32) -> u32 {
-        0xff
+    fn find<L: Eight>(&self, _triangles: &[&Projected; 8], _tnear: f32, _tfar: f32) -> Finds<L> {
+        Finds::open(0xff)
     }
 }

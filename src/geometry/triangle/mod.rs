@@ -17,7 +17,7 @@ pub mod watertight;
 
 pub use accuracy::Accuracy;
 pub use record::Triangle;
-pub use test::{Alone, Candidate, Exact, Fast, Lanes3, Mode, Test, Watertight};
+pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Test, Watertight};
 
 use glam::{DVec3, Vec3};
 

@@ -79,9 +79,31 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
 
 /// One ray prepared for being tested against many triangles at once.
 pub trait Alone: Test<1, f32> {
-    /// A bit for each of eight triangles that the ray may hit with a `t` from `tnear` to `tfar`: for all
-    /// that [`test`](Test::test) finds there, and for few others.
-    fn sift<L: Eight>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> u32;
+    /// Eight triangles against the ray: which of them it hits with a `t` from `tnear` to `tfar`. What is found
+    /// is what [`test`](Test::test) finds, to the bit.
+    fn find<L: Eight>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> Finds<L>;
+}
+
+/// What a ray finds of eight triangles, a lane each.
+pub struct Finds<L: Eight> {
+    /// Triangles that are hit.
+    pub hits: L::Mask,
+    /// The ray's parameter, in the lanes of `hits`.
+    pub t: L,
+    /// Two numbers in proportion to the weights of the second and third corner, and what they are to be divided
+    /// by.
+    pub weights: [L; 3],
+    /// A bit for each triangle of which [`test`](Test::test) has yet to say whether it is hit. None is in `hits`.
+    pub open: u32,
+}
+
+impl<L: Eight> Finds<L> {
+    /// Nothing but triangles to be tested.
+    #[inline(always)]
+    pub(super) fn open(open: u32) -> Self {
+        let zero = L::splat(0.0);
+        Self { hits: L::mask_from_bits(0), t: zero, weights: [zero; 3], open }
+    }
 }
 
 /// The lanes of a packet that may have hit a triangle.

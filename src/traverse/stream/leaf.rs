@@ -4,8 +4,8 @@
 //! packets find, bit for bit.
 
 use super::flight::Flight;
-use crate::geometry::triangle::Alone;
-use crate::simd::Eight;
+use crate::geometry::triangle::{Alone, Finds};
+use crate::simd::{Eight, Mask};
 
 /// Tests the triangles of the leaf whose record begins at `record` in `words`, and says whether one was hit.
 #[inline(always)]
@@ -27,17 +27,18 @@ pub fn visit<L: Eight, A: Alone>(
             triangles[lane] = &records[primitives[lane].min(last) as usize];
         }
         let lanes = (1 << rest.min(8)) - 1;
-        let mut likely = flight.test.sift::<L>(&triangles, flight.tnear, flight.tfar) & lanes;
-        while likely != 0 {
-            let lane = likely.trailing_zeros() as usize & 7;
-            likely &= likely - 1;
+        let finds = flight.test.find::<L>(&triangles, flight.tnear, flight.tfar);
+        let hits = finds.hits.bits() & lanes;
+        if hits != 0 {
+            found |= flight.take_nearest(&finds, hits, primitives);
+        }
+        let mut open = finds.open & lanes;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize & 7;
+            open &= open - 1;
             let candidate = flight.test.test(triangles[lane], true);
-            let (t, primitive) = (candidate.t, primitives[lane]);
-            let nearer = t < flight.tfar || t == flight.tfar && primitive < flight.primitive;
-            if candidate.inside && flight.tnear <= t && nearer {
-                (flight.tfar, flight.primitive) = (t, primitive);
-                flight.weights = [candidate.u, candidate.v];
-                found = true;
+            if candidate.inside && flight.tnear <= candidate.t {
+                found |= flight.take(candidate.t, primitives[lane], [candidate.u, candidate.v]);
             }
         }
         if rest <= 8 {
@@ -45,5 +46,36 @@ pub fn visit<L: Eight, A: Alone>(
         }
         rest -= 8;
         next += 8;
+    }
+}
+
+impl<A: Alone> Flight<A> {
+    /// Takes a hit if it is nearer than what the ray has, or as near and of a lower id; says whether it is.
+    #[inline(always)]
+    fn take(&mut self, t: f32, primitive: u32, weights: [f32; 2]) -> bool {
+        let nearer = t < self.tfar || t == self.tfar && primitive < self.primitive;
+        if nearer {
+            (self.tfar, self.primitive, self.weights) = (t, primitive, weights);
+        }
+        nearer
+    }
+
+    /// The same for the nearest of the lanes in `hits`, of which there is one at least.
+    #[inline(always)]
+    fn take_nearest<L: Eight>(&mut self, finds: &Finds<L>, hits: u32, primitives: &[u32; 8]) -> bool {
+        let t = L::select(L::mask_from_bits(hits), finds.t, L::splat(f32::INFINITY));
+        let least = t.least();
+        let mut nearest = t.eq(L::splat(least)).bits() & hits;
+        let mut lane = nearest.trailing_zeros() as usize & 7;
+        nearest &= nearest.wrapping_sub(1);
+        while nearest != 0 {
+            let other = nearest.trailing_zeros() as usize & 7;
+            nearest &= nearest - 1;
+            if primitives[other] < primitives[lane] {
+                lane = other;
+            }
+        }
+        let [b, c, sum] = finds.weights.map(|weight| weight.store()[lane]);
+        self.take(least, primitives[lane], [b / sum, c / sum])
     }
 }

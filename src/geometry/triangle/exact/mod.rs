@@ -10,7 +10,7 @@
 mod determinant;
 
 use super::watertight::Shear;
-use super::{Alone, Candidate, Corners, Lanes3, Test, Triangle};
+use super::{Alone, Candidate, Corners, Finds, Lanes3, Test, Triangle};
 use crate::simd::{Eight, Lanes, Mask};
 use determinant::{along_normal, volume};
 use glam::{DVec3, Vec3};
@@ -70,8 +70,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
 
 impl Alone for Filter<1, f32> {
     #[inline(always)]
-    fn sift<L: Eight>(&self, triangles: &[&Triangle; 8], _tnear: f32, _tfar: f32) -> u32 {
-        self.shear.likely_of_eight::<L>(triangles)
+    fn find<L: Eight>(&self, triangles: &[&Triangle; 8], _tnear: f32, _tfar: f32) -> Finds<L> {
+        Finds::open(self.shear.likely_of_eight::<L>(triangles))
     }
 }
 

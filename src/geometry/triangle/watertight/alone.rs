@@ -1,65 +1,193 @@
 //! One ray against eight triangles at once.
 //!
 //! Lanes hold triangles instead of rays. What is computed in a lane is what the test of one triangle computes,
-//! operation by operation, so it has the same bits.
+//! operation by operation, so it has the same bits. What that test seldom does (signs in double precision,
+//! clipping rays that graze the plane, triangles without area) is left to it.
 
+use super::distance::GRAZING;
 use super::{Shear, likely};
-use crate::geometry::triangle::{Alone, Lanes3, RENAMED, Triangle};
+use crate::geometry::triangle::{Alone, Finds, Lanes3, RENAMED, Triangle};
 use crate::simd::{Eight, Mask};
 
-impl Shear<1, f32> {
-    /// The corners of eight triangles sheared, with coordinates renamed: `[corner][coordinate]`.
-    #[inline(always)]
-    fn sheared_eight<L: Eight>(&self, triangles: &[&Triangle; 8]) -> [Lanes3<L>; 3] {
-        let [i, j, k] = RENAMED[self.major.unwrap_or(2)].map(|axis| axis as i32);
-        // A four holds one coordinate more than a corner has: of the next corner, or of the one before.
-        let places = [
-            L::ids_load(&[i, j, k, 3, i, j, k, 3]),
-            L::ids_load(&[i + 1, j + 1, k + 1, 0, i + 1, j + 1, k + 1, 0]),
-        ];
-        let mut corners = [[L::splat(0.0); 3]; 3];
-        for (corner, first) in [0, 3, 5].into_iter().enumerate() {
-            let mut rows = [L::splat(0.0); 4];
-            for (row, pair) in rows.iter_mut().enumerate() {
-                *pair = L::of_fours([four(triangles[row], first), four(triangles[row + 4], first)])
-                    .pick_in_fours(places[corner / 2]);
-            }
-            let [x, y, z, _] = L::transpose_fours(rows);
-            let [ox, oy, oz] = self.origin;
-            let [sx, sy, _] = self.shear;
-            let (x, y, z) = (x - L::splat(ox), y - L::splat(oy), z - L::splat(oz));
-            corners[corner] = [x - L::splat(sx) * z, y - L::splat(sy) * z, z];
+/// Eight triangles' coordinates, a row for each: three for each corner, then the plane's. The fourth row of each
+/// three is there for an index of two bits to need no check.
+type Columns = [[[f32; 8]; 4]; 4];
+
+/// Brings eight triangles' coordinates together.
+#[inline(always)]
+fn columns<L: Eight>(triangles: &[&Triangle; 8]) -> Columns {
+    let mut columns = [[[0.0; 8]; 4]; 4];
+    for four in 0..3 {
+        let mut rows = [L::splat(0.0); 4];
+        for (row, pair) in rows.iter_mut().enumerate() {
+            let halves = [triangles[row], triangles[row + 4]].map(|triangle| &triangle.fours()[four]);
+            *pair = L::of_fours(halves);
         }
-        corners
+        for (i, column) in L::transpose_fours(rows).into_iter().enumerate() {
+            let place = 4 * four + i;
+            columns[place / 3][place % 3] = column.store();
+        }
+    }
+    columns
+}
+
+impl Shear<1, f32> {
+    /// Three coordinates of eight triangles, renamed.
+    #[inline(always)]
+    fn renamed_eight<L: Eight>(&self, columns: &[[f32; 8]; 4]) -> Lanes3<L> {
+        RENAMED[self.major.unwrap_or(2)].map(|axis| L::load(&columns[axis & 3]))
+    }
+
+    /// A corner of eight triangles relative to the origin, with its coordinates renamed.
+    #[inline(always)]
+    fn translated_eight<L: Eight>(&self, columns: &[[f32; 8]; 4]) -> Lanes3<L> {
+        let ([x, y, z], [ox, oy, oz]) = (self.renamed_eight::<L>(columns), self.origin);
+        [x - L::splat(ox), y - L::splat(oy), z - L::splat(oz)]
+    }
+
+    /// The same sheared.
+    #[inline(always)]
+    fn shear_eight<L: Eight>(&self, [x, y, z]: Lanes3<L>) -> Lanes3<L> {
+        let [sx, sy, _] = self.shear;
+        [x - L::splat(sx) * z, y - L::splat(sy) * z, z]
     }
 
     /// [`Shear::likely`] of eight triangles.
     #[inline(always)]
     pub(crate) fn likely_of_eight<L: Eight>(&self, triangles: &[&Triangle; 8]) -> u32 {
-        likely(self.sheared_eight::<L>(triangles)).bits()
+        let [a, b, c, _] = columns::<L>(triangles);
+        likely([&a, &b, &c].map(|corner| self.shear_eight(self.translated_eight::<L>(corner)))).bits()
     }
-}
-
-/// Four coordinates of a triangle from `first` on.
-#[inline(always)]
-fn four(triangle: &Triangle, first: usize) -> &[f32; 4] {
-    triangle.corners.as_flattened()[first..].first_chunk().expect("nine coordinates")
 }
 
 impl Alone for Shear<1, f32> {
     #[inline(always)]
-    fn sift<L: Eight>(&self, triangles: &[&Triangle; 8], tnear: f32, tfar: f32) -> u32 {
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = self.sheared_eight::<L>(triangles);
+    fn find<L: Eight>(&self, triangles: &[&Triangle; 8], tnear: f32, tfar: f32) -> Finds<L> {
+        let [p0, p1, p2, plane] = columns::<L>(triangles);
+        let corner = self.translated_eight::<L>(&p0);
+        let [ax, ay, az] = self.shear_eight(corner);
+        let [bx, by, bz] = self.shear_eight(self.translated_eight::<L>(&p1));
+        let [cx, cy, cz] = self.shear_eight(self.translated_eight::<L>(&p2));
+
+        // As in `decide`.
         let a = cx * by - cy * bx;
         let b = ax * cy - ay * cx;
         let c = bx * ay - by * ax;
         let zero = L::splat(0.0);
-        let outside = a.min(b).min(c).lt(zero) & zero.lt(a.max(b).max(c));
+        let inside = !(a.min(b).min(c).lt(zero) & zero.lt(a.max(b).max(c)));
 
         // `t` is kept between these.
         let scale = L::splat(self.shear[2]);
         let (az, bz, cz) = (scale * az, scale * bz, scale * cz);
         let (nearest, farthest) = (az.min(bz).min(cz), az.max(bz).max(cz));
-        (!outside & nearest.le(L::splat(tfar)) & L::splat(tnear).le(farthest)).bits()
+        let inside = inside & nearest.le(L::splat(tfar)) & L::splat(tnear).le(farthest);
+
+        // As in `meet_plane`.
+        let [nx, ny, nz] = self.renamed_eight::<L>(&plane);
+        let [px, py, pz] = corner;
+        let height = nx * px + ny * py + nz * pz;
+        let [dx, dy, dz] = self.direction;
+        let speed = nx * L::splat(dx) + ny * L::splat(dy) + nz * L::splat(dz);
+        let t = (height / speed).max(nearest).min(farthest);
+
+        // A triangle without area has a plane of zeros, and so no speed.
+        let grazes = !L::splat(GRAZING * dz.abs()).le(speed.abs());
+        let open = inside & (grazes | a.eq(zero) | b.eq(zero) | c.eq(zero));
+        let sum = a + b + c;
+        let hits = inside & !open & (sum.lt(zero) | zero.lt(sum));
+        let hits = hits & L::splat(tnear).le(t) & t.le(L::splat(tfar));
+        Finds { hits, t, weights: [b, c, sum], open: open.bits() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::triangle::{Corners, Test};
+    use crate::simd::Lanes;
+    use crate::simd::{Chosen, Isa, Simd, Task};
+    use proptest::prelude::*;
+
+    /// Whether each of eight triangles is hit between the ray's ends, and where: `t` and the weights.
+    type Answers = [Option<[f32; 3]>; 8];
+
+    struct Eights<'a>(&'a Shear<1, f32>, &'a [&'a Triangle; 8], [f32; 2]);
+
+    impl Task for Eights<'_> {
+        type Output = (Answers, u32);
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> (Answers, u32) {
+            let Self(ray, triangles, [tnear, tfar]) = self;
+            let finds = ray.find::<S::F8>(triangles, tnear, tfar);
+            let (hits, t) = (finds.hits.bits() & 0xff, finds.t.store());
+            let [b, c, sum] = finds.weights.map(|weight| weight.store());
+            let hit = |lane: usize| {
+                (hits >> lane & 1 == 1).then(|| [t[lane], b[lane] / sum[lane], c[lane] / sum[lane]])
+            };
+            (std::array::from_fn(hit), finds.open & 0xff)
+        }
+    }
+
+    /// Asks both ways, on every instruction set; says which triangles were left open.
+    fn check(origin: [f32; 3], direction: [f32; 3], corners: &[Corners; 8], ends: [f32; 2]) -> u32 {
+        let triangles = corners.map(Triangle::new);
+        let triangles = triangles.each_ref();
+        let ray = Shear::<1, f32>::new(&origin, &direction, 1);
+        let mut left = 0;
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            let (answers, open) = chosen.run(Eights(&ray, &triangles, ends));
+            for lane in 0..8 {
+                let one = ray.test(triangles[lane], true);
+                let wanted =
+                    (one.inside && ends[0] <= one.t && one.t <= ends[1]).then_some([one.t, one.u, one.v]);
+                let bits = |answer: Option<[f32; 3]>| answer.map(|numbers| numbers.map(f32::to_bits));
+                if open >> lane & 1 == 1 {
+                    assert_eq!(answers[lane], None, "an open triangle is no hit");
+                } else {
+                    assert_eq!(bits(answers[lane]), bits(wanted), "{isa}, {:?}", corners[lane]);
+                }
+            }
+            left |= open;
+        }
+        left
+    }
+
+    const FAR: [f32; 2] = [0.0, f32::MAX];
+
+    #[test]
+    fn what_is_in_doubt_is_left_open() {
+        let across = [[-1.0, -1.0, 2.0], [1.0, -1.0, 2.0], [0.0, 1.0, 2.0]];
+        let beside = across.map(|[x, y, z]| [x + 5.0, y, z]);
+        let on_an_edge = across.map(|[x, y, z]| [x, y + 1.0, z]);
+        let on_a_corner = across.map(|[x, y, z]| [x, y - 1.0, z]);
+        let grazed = [[-1.0, -0.01, 0.0], [1.0, -0.01, 0.0], [0.0, 0.01, 9.0]];
+        let line = [[-1.0, -1.0, 2.0], [0.0, 0.0, 2.0], [1.0, 1.0, 2.0]];
+        let behind = across.map(|[x, y, z]| [x, y, -z]);
+        let eight = [across, beside, on_an_edge, on_a_corner, grazed, line, behind, across];
+        assert_eq!(check([0.0; 3], [0.0, 0.0, 1.0], &eight, FAR), 0b0011_1100);
+        // A ray that is none hits nothing, whoever is asked.
+        check([0.0; 3], [f32::NAN, 0.0, 1.0], &eight, FAR);
+    }
+
+    proptest! {
+        #[test]
+        fn eight_at_once_answer_as_one_by_one(
+            numbers in proptest::array::uniform32(-1.0f32..1.0),
+            more in proptest::array::uniform32(-1.0f32..1.0),
+            last in proptest::array::uniform14(-1.0f32..1.0),
+            round in 0u32..4,
+        ) {
+            // Coarse coordinates make for shared edges, triangles without area and zeros of both signs.
+            let scale = [1e6, 64.0, 4.0, 2.0][round as usize];
+            let all: Vec<f32> =
+                numbers.iter().chain(&more).chain(&last).map(|x| (x * scale).round() / scale).collect();
+            let point = |i: usize| [all[3 * i], all[3 * i + 1], all[3 * i + 2]];
+            let corners = std::array::from_fn(|i| [point(3 * i), point(3 * i + 1), point(3 * i + 2)]);
+            let (origin, toward) = (point(24), point(25));
+            check(origin, toward, &corners, [0.0, f32::MAX]);
+            check(origin, toward, &corners, [0.25, 0.75]);
+        }
     }
 }

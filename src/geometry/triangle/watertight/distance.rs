@@ -19,7 +19,7 @@ use crate::simd::{Lanes, Mask};
 use glam::DVec3;
 
 /// A ray whose cosine with the normal is less than about this grazes the plane.
-const GRAZING: f32 = 0.25;
+pub(super) const GRAZING: f32 = 0.25;
 
 /// How far beyond an edge a ray may pass a triangle that it hits, relative to the farthest corner:
 /// sheared coordinates are off by up to six roundings, and what is computed here by about as many.
