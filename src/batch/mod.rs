@@ -41,19 +41,18 @@
 //! Of a scene that is in memory in part, a block that cannot be read unwinds: see
 //! [`Cached::or_error`](crate::cache::Cached::or_error).
 
-mod choice;
+mod generated;
 #[cfg(feature = "numpy")]
 pub mod numpy;
+mod work;
+
+pub use generated::Generated;
+pub use work::Traced;
 
 use crate::geometry::{Hit, Ray};
-use crate::render::{Sharing, Workers};
-use crate::traverse::{Accel, Kernel, Stopwatch};
+use crate::traverse::{Accel, Kernel};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
-use std::time::Instant;
-
-/// Rays that a worker takes at once: some milliseconds, and a whole number of packets.
-const CHUNK: usize = 4096;
+use work::{CHUNK, Plan};
 
 /// Rays to be traced, and how.
 #[derive(Debug)]
@@ -65,27 +64,16 @@ pub struct Batch<'a> {
     done: AtomicUsize,
 }
 
-/// How a batch was traced.
-#[derive(Clone, Copy, Debug)]
-pub struct Traced {
-    /// The kernel.
-    pub kernel: Kernel,
-    /// Threads at work at a time: no more than there was work for.
-    pub threads: usize,
-    /// Wall-clock time, the choice of the kernel included.
-    pub seconds: f64,
-}
-
 impl<'a> Batch<'a> {
     /// A batch to be traced by the kernel that suits it, on all processors.
     pub fn new(accel: &'a Accel, rays: &'a [Ray]) -> Self {
         Self { accel, rays, kernel: None, threads: 0, done: AtomicUsize::new(0) }
     }
 
-    /// The same, traced by `kernel`; `None` for the one that is quickest with a sample of the rays.
+    /// The same, traced by `kernel`; `None` for whichever is found to be quickest, lot by lot.
     ///
-    /// Packets are several times quicker if rays that follow one another go the same way, and no
-    /// quicker or slower than single rays if they do not. Answers are the same.
+    /// Packets and beams are several times quicker if rays that follow one another go the same way, and
+    /// streams if they do not. Answers are the same.
     pub fn with_kernel(self, kernel: Option<Kernel>) -> Self {
         Self { kernel, ..self }
     }
@@ -103,59 +91,28 @@ impl<'a> Batch<'a> {
     /// The closest hit of each ray, [`Hit::MISS`] where there is none. Panics if there are not as many
     /// `hits` as rays.
     pub fn intersect(&self, hits: &mut [Hit]) -> Traced {
-        self.trace(hits, Hit::MISS, |kernel, rays, hits| self.accel.intersect_many(kernel, rays, hits))
+        assert_eq!(self.rays.len(), hits.len(), "as many answers as rays");
+        let jobs = self.rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)).collect();
+        self.plan().run(jobs, |tracer, (rays, hits)| {
+            tracer.intersect(rays, hits);
+            self.done.fetch_add(rays.len(), Ordering::Relaxed);
+        })
     }
 
     /// Whether anything lies in each ray's interval. Panics if there are not as many answers as rays.
     pub fn occluded(&self, occluded: &mut [bool]) -> Traced {
-        self.trace(occluded, false, |kernel, rays, answers| self.accel.occluded_many(kernel, rays, answers))
+        assert_eq!(self.rays.len(), occluded.len(), "as many answers as rays");
+        let jobs = self.rays.chunks(CHUNK).zip(occluded.chunks_mut(CHUNK)).collect();
+        self.plan().run(jobs, |tracer, (rays, occluded)| {
+            tracer.occluded(rays, occluded);
+            self.done.fetch_add(rays.len(), Ordering::Relaxed);
+        })
     }
 
-    fn trace<A: Copy + Send>(
-        &self,
-        answers: &mut [A],
-        none: A,
-        call: impl Fn(Kernel, &[Ray], &mut [A]) + Sync,
-    ) -> Traced {
-        assert_eq!(self.rays.len(), answers.len(), "as many answers as rays");
+    /// How to trace, from the beginning.
+    fn plan(&self) -> Plan<'_> {
         self.done.store(0, Ordering::Relaxed);
-        let start = Instant::now();
-        let threads = match self.threads {
-            0 => thread::available_parallelism().map_or(1, usize::from),
-            threads => threads,
-        };
-        let cached = self.accel.cached();
-        if let Some(cached) = cached {
-            cached.begin_frame();
-        }
-        let timed = |kernel, rays: &[Ray], answers: &mut [A]| {
-            let watch = Stopwatch::start(self.accel);
-            call(kernel, rays, answers);
-            watch.elapsed(self.accel)
-        };
-        let kernel = self.kernel.unwrap_or_else(|| choice::quickest(self.rays, none, &timed));
-        let jobs: Vec<_> = self.rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)).collect();
-        let threads = threads.min(jobs.len());
-        let workers = match cached {
-            None => Workers { threads, pin: false, sharing: Sharing::Runs },
-            // More threads, of which some wait for their blocks. Rays that follow one another in the file are likely
-            // to need the same ones.
-            Some(cached) => {
-                let threads = cached.workers(threads).min(jobs.len());
-                Workers { threads, pin: false, sharing: Sharing::Queue }
-            }
-        };
-        workers.run(
-            jobs,
-            || (),
-            |(), (rays, answers): (&[Ray], &mut [A])| {
-                // A scene that is in memory in part gives its turns by chunks.
-                let _session = cached.map(|cached| cached.session());
-                call(kernel, rays, answers);
-                self.done.fetch_add(rays.len(), Ordering::Relaxed);
-            },
-        );
-        Traced { kernel, threads, seconds: start.elapsed().as_secs_f64() }
+        Plan { accel: self.accel, kernel: self.kernel, threads: self.threads }
     }
 
     /// About how many bytes a batch of so many rays takes beside the rays and their answers.

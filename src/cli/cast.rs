@@ -17,6 +17,7 @@ use crate::simd::Isa;
 use crate::store::is_scene;
 use crate::traverse::Kernel;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -67,7 +68,7 @@ pub struct Args {
     /// Worker threads; 0 for all processors [default: the profile's]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Rays that are traced together: 1, 4, 8, 16 or 256 [default: what is quickest with a sample of the rays]
+    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream) or 256 [default: what is quickest, lot by lot]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     #[command(flatten)]
@@ -86,7 +87,10 @@ struct Report<'a> {
     profile: &'a str,
     isa: &'static str,
     accuracy: Accuracy,
+    /// Rays that the kernel traces together which traced most of them.
     packet: usize,
+    /// Rays by kernel.
+    kernels: BTreeMap<&'static str, u64>,
     threads: usize,
     /// Whether any hit was asked for instead of the closest.
     any: bool,
@@ -145,7 +149,8 @@ pub fn run(args: &Args) -> Result<()> {
         profile: args.build.name(),
         isa: isa.name(),
         accuracy,
-        packet: traced.kernel.width(),
+        packet: traced.kernel().width(),
+        kernels: traced.kernels.iter().map(|&(kernel, rays)| (kernel.name(), rays)).collect(),
         threads: traced.threads,
         any: args.any,
         count: RayCount::of(rays.len() as u64, traced.seconds),
@@ -233,7 +238,12 @@ impl Args {
             format!("{}, {size}, read in {}", grouped(rays), duration(report.rays_read_seconds)),
         );
         let packets = Kernel::of_width(report.packet).map_or("", Kernel::rays);
-        let chosen = if self.packet.is_none() { " (chosen)" } else { "" };
+        let chosen = match report.kernels.values().max() {
+            Some(&most) if self.packet.is_none() => {
+                format!(" (chosen, for {:.0} % of the rays)", 100.0 * most as f64 / rays.max(1) as f64)
+            }
+            _ => String::new(),
+        };
         let Engine { version, build } = ENGINE;
         lines.add(
             "engine",

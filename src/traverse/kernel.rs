@@ -13,7 +13,7 @@ pub enum Kernel {
     Packet8,
     /// Sixteen.
     Packet16,
-    /// Sixty-four rays in flight, each alone: for rays that have nothing in common.
+    /// Some thirty rays in flight, each alone: for rays that have nothing in common. It is handed 64 at least.
     Stream,
     /// Up to 256 rays from one point as sixteen packets; rays that are too unlike go packet by packet.
     Tile,

@@ -29,7 +29,7 @@ mod width;
 
 pub use accel::Accel;
 pub use coarse::{Entry, first_page};
-pub use dispatch::{Dispatch, DispatchPool};
+pub use dispatch::{Dispatch, DispatchPool, SliceDispatch};
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, RayPacket};
 pub use sieve::Sieve;

@@ -9,8 +9,10 @@
 
 mod choice;
 mod pool;
+mod slices;
 
 pub use pool::DispatchPool;
+pub use slices::SliceDispatch;
 
 use super::accel::Accel;
 use super::kernel::Kernel;
@@ -27,7 +29,7 @@ const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
 const FRUGAL: usize = 1;
 
 /// Fewer rays than this say nothing about a kernel: reading the clock takes as long.
-const LEAST_RAYS: u32 = 64;
+const LEAST_RAYS: usize = 64;
 
 /// What one worker has learnt about which kernel is quickest: for closest hits, and for any hit.
 ///
@@ -48,7 +50,7 @@ impl Dispatch {
         active: &[u32],
         hits: &mut [HitPacket<16>],
     ) {
-        timed(accel, &mut self.closest, active, |kernel| match kernel {
+        timed(accel, &WAYS, &mut self.closest, count(active), |kernel| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => {
                 for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
@@ -65,7 +67,7 @@ impl Dispatch {
 
     /// As [`Accel::occluded_tile`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
-        timed(accel, &mut self.any, active, |kernel| match kernel {
+        timed(accel, &WAYS, &mut self.any, count(active), |kernel| match kernel {
             Kernel::Tile => accel.occluded_tile(rays, active, occluded),
             Kernel::Packet8 => {
                 for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
@@ -86,20 +88,32 @@ impl Dispatch {
     }
 }
 
-/// Has a kernel trace the lanes in `active`, and takes note of how long that took.
+/// Has a kernel trace so many rays, and takes note of how long that took.
 #[inline(always)]
-fn timed(accel: &Accel, choice: &mut Choice<{ WAYS.len() }>, active: &[u32], trace: impl FnOnce(Kernel)) {
-    let rays: u32 = active.iter().map(|lanes| lanes.count_ones()).sum();
+fn timed<const N: usize>(
+    accel: &Accel,
+    ways: &[Kernel; N],
+    choice: &mut Choice<N>,
+    rays: usize,
+    trace: impl FnOnce(Kernel),
+) -> usize {
     if accel.cached().is_some_and(|cached| cached.is_short()) {
-        trace(WAYS[FRUGAL]);
-        return;
+        trace(ways[FRUGAL]);
+        return FRUGAL;
     }
     if rays < LEAST_RAYS {
-        trace(WAYS[choice.quickest()]);
-        return;
+        let way = choice.quickest();
+        trace(ways[way]);
+        return way;
     }
     let way = choice.next();
     let start = Stopwatch::start(accel);
-    trace(WAYS[way]);
-    choice.record(way, u64::from(rays), start.elapsed(accel));
+    trace(ways[way]);
+    choice.record(way, rays as u64, start.elapsed(accel));
+    way
+}
+
+/// The lanes in which there are rays.
+fn count(active: &[u32]) -> usize {
+    active.iter().map(|lanes| lanes.count_ones() as usize).sum()
 }

@@ -3,23 +3,23 @@
 use super::Dispatch;
 use std::sync::{Mutex, PoisonError};
 
-/// [`Dispatch`]es that nobody is using. Workers take one each when they begin and put it back when they end,
+/// [`Dispatch`]es, or [`SliceDispatch`](super::SliceDispatch)es, that nobody is using. Workers take one each when they begin and put it back when they end,
 /// so that who comes next, mostly the same workers, need not learn anew which kernel is quickest.
 ///
 /// It never holds more of them than were out at the same time.
 #[derive(Debug, Default)]
-pub struct DispatchPool {
-    idle: Mutex<Vec<Dispatch>>,
+pub struct DispatchPool<D = Dispatch> {
+    idle: Mutex<Vec<D>>,
 }
 
-impl DispatchPool {
+impl<D: Default> DispatchPool<D> {
     /// The one that was put back last; one that knows nothing yet if there is none.
-    pub fn take(&self) -> Dispatch {
+    pub fn take(&self) -> D {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
     /// Keeps what a worker has learnt.
-    pub fn put(&self, dispatch: Dispatch) {
+    pub fn put(&self, dispatch: D) {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(dispatch);
     }
 }
@@ -31,7 +31,7 @@ mod tests {
 
     #[test]
     fn what_was_learnt_is_given_to_the_next_and_to_nobody_else() {
-        let pool = DispatchPool::default();
+        let pool = DispatchPool::<Dispatch>::default();
         let said = |dispatch: Dispatch| format!("{dispatch:?}");
         let ignorant = said(Dispatch::default());
         assert_eq!(said(pool.take()), ignorant, "nobody has learnt anything");
