@@ -28,8 +28,8 @@ fn bench(model: &PathBuf) -> Command {
     command
 }
 
-/// raypack's modes: its kernels, and the choice among them.
-const MODES: usize = Kernel::ALL.len() + 1;
+/// raypack's modes: its kernels, and the two choices among them.
+const MODES: usize = Kernel::ALL.len() + 2;
 
 #[test]
 fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
@@ -76,7 +76,7 @@ fn json_on_standard_output_is_nothing_but_json() {
     let modes: Vec<&str> =
         report["rows"].as_array().unwrap().iter().map(|row| row["mode"].as_str().unwrap()).collect();
     let kernels = Kernel::ALL.iter().map(|kernel| kernel.name());
-    assert_eq!(modes, kernels.chain(["auto"]).collect::<Vec<_>>());
+    assert_eq!(modes, kernels.chain(["auto", "mixed"]).collect::<Vec<_>>());
     let beams = report["beams"].as_array().unwrap();
     assert!(beams[0]["rays"] == "camera" && beams[0]["counts"]["nodes"].as_u64() > Some(0), "{beams:?}");
 }
@@ -171,4 +171,49 @@ fn an_embree_that_is_not_where_it_is_said_to_be_is_an_error() {
     let run =
         bench(&model).env("RAYPACK_EMBREE", folder.path()).args(["--engines", "raypack,embree"]).assert();
     run.failure().code(1).stderr(predicate::str::contains("RAYPACK_EMBREE"));
+}
+
+fn scaling() -> Command {
+    let mut command = Command::cargo_bin("raypack").unwrap();
+    command.arg("scaling").env_remove("RAYPACK_EMBREE").env_remove("RAYPACK_ISA");
+    command.args(["--engines", "raypack,obvhs", "--modes", "stream,packet8", "--rays", "random"]);
+    command.args(["--size", "16", "--rounds", "1"]);
+    command
+}
+
+#[test]
+fn the_growth_of_a_rays_time_is_measured_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let [json, plot] = ["report.json", "plot.svg"].map(|name| folder.path().join(name));
+    let run =
+        scaling().args(["--triangles", "10k,15k"]).arg("--json").arg(&json).arg("--plot").arg(&plot).assert();
+    run.success().stdout(predicate::str::contains("greatest plant beside smallest: raypack "));
+    let report: Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+    let steps = report["steps"].as_array().unwrap();
+    assert_eq!(steps.len(), 2);
+    for (step, wanted) in steps.iter().zip([10e3, 15e3]) {
+        let triangles = step["triangles"].as_f64().unwrap();
+        assert!((triangles / wanted - 1.0).abs() < 0.05, "{triangles}");
+        let times = step["times"].as_array().unwrap();
+        assert_eq!(times.iter().map(|time| &time["engine"]).collect::<Vec<_>>(), ["raypack", "obvhs"]);
+        assert!(times.iter().all(|time| time["ns_per_ray"].as_f64().unwrap() > 0.0));
+    }
+    let text = fs::read_to_string(&plot).unwrap();
+    assert!(text.contains("random rays") && text.contains("obvhs") && text.contains("ns a ray"));
+}
+
+#[test]
+fn sizes_that_make_no_sense_are_named() {
+    for (options, message) in [
+        (["--triangles", "9999"], "--triangles: \"9999\" is not a number"),
+        (["--triangles", "20k,10k"], "--triangles: 20000 does not grow to 10000"),
+        (["--engines", "obvhs"], "--engines: raypack must be among them"),
+        (["--modes", "best"], "--modes: \"best\" is not one of"),
+        (["--rounds", "0"], "--rounds: 0 rounds measure nothing"),
+        (["--plot", "plot.txt"], "plot.txt: unknown kind of file (.txt); a plot is a .svg or .png file"),
+    ] {
+        let mut command = Command::cargo_bin("raypack").unwrap();
+        let run = command.arg("scaling").args(options).assert();
+        run.failure().stderr(predicate::str::contains(message)).stdout("");
+    }
 }

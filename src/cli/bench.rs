@@ -41,7 +41,8 @@ pub struct Args {
     /// Engines
     #[arg(long, value_delimiter = ',', default_value = "raypack,embree,obvhs")]
     engines: Vec<String>,
-    /// raypack's modes: single, packet4, packet8, packet16, stream, tile, auto; all of them if none is named
+    /// raypack's modes: single, packet4, packet8, packet16, stream, tile, auto (what render does), mixed (what
+    /// cast does); all of them if none is named
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     modes: Vec<String>,
     /// Race with one thread, and with this many; 0 for all processors
@@ -79,17 +80,19 @@ pub fn run(args: &Args) -> Result<()> {
     args.json.check()?;
     let model = Model::read(&args.model)?;
     args.build.fit(&model.mesh, &mut options.build)?;
-    let mut progress = |line: &str| {
-        if std::io::stderr().is_terminal() {
-            eprintln!("{line} …");
-        }
-    };
     if args.builds {
-        let report = bench_builds(&model.name, &model.mesh, &options, args.build_rounds, &mut progress)?;
+        let report = bench_builds(&model.name, &model.mesh, &options, args.build_rounds, &mut watch)?;
         return args.json.give(&report.to_string(), &report);
     }
-    let report = bench(&model.name, &model.mesh, &options, &mut progress)?;
+    let report = bench(&model.name, &model.mesh, &options, &mut watch)?;
     args.json.give(&report.to_string(), &report)
+}
+
+/// Says what is about to happen to who looks on.
+pub fn watch(line: &str) {
+    if std::io::stderr().is_terminal() {
+        eprintln!("{line} …");
+    }
 }
 
 fn options(args: &Args) -> Result<Options> {

@@ -145,7 +145,7 @@ fn scene(args: &PlantArgs, params: PlantParams) -> Result<Report<'_>> {
 }
 
 /// A number of triangles: digits, a decimal point if wanted, and `k` or `M`.
-fn count(text: &str) -> Result<u64> {
+pub fn count(text: &str) -> Result<u64> {
     let wrong = |what: &str| {
         let (low, high) = (grouped(*TRIANGLES.start()), grouped(*TRIANGLES.end()));
         Error::option("--triangles", format!("\"{text}\" {what} from {low} to {high}, such as 300k or 12.7M"))

@@ -20,6 +20,7 @@ mod outputs;
 mod progress;
 mod render;
 mod report;
+mod scaling;
 mod scene;
 mod tune;
 
@@ -46,6 +47,7 @@ enum Command {
     Effects(effects::Args),
     Info(info::Args),
     Bench(bench::Args),
+    Scaling(scaling::Args),
     Accuracy(accuracy::Args),
     Cache(cache::Args),
     Cast(cast::Args),
@@ -63,6 +65,7 @@ pub fn main() -> ExitCode {
         Command::Effects(args) => effects::run(args),
         Command::Info(args) => info::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Scaling(args) => scaling::run(args),
         Command::Accuracy(args) => accuracy::run(args),
         Command::Cache(args) => cache::run(args),
         Command::Cast(args) => cast::run(args),

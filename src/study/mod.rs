@@ -14,6 +14,7 @@ pub mod plot;
 pub mod rays;
 pub mod reference;
 pub mod resident;
+pub mod scaling;
 pub(crate) mod text;
 pub mod tune;
 pub mod views;

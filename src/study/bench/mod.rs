@@ -92,7 +92,7 @@ pub struct Options {
     pub kinds: Vec<RayKind>,
     /// Engines, in the order of the report.
     pub engines: Vec<EngineName>,
-    /// raypack's modes, by name: its kernels, and `auto`. None named are all. Rivals always race in every mode.
+    /// raypack's modes, by name: its kernels, `auto` and `mixed`. None named are all. Rivals always race in every mode.
     pub modes: Vec<String>,
     /// The camera; `None` frames the model.
     pub camera: Option<Camera>,
@@ -194,7 +194,8 @@ fn check(options: &Options) -> Result<()> {
     if options.engines.is_empty() {
         return Err(Error::option("--engines", "no engine is named; known are raypack, embree, obvhs"));
     }
-    let known: Vec<&str> = Kernel::ALL.iter().map(|kernel| kernel.name()).chain([ours::AUTO]).collect();
+    let known: Vec<&str> =
+        Kernel::ALL.iter().map(|kernel| kernel.name()).chain([ours::AUTO, ours::MIXED]).collect();
     if let Some(mode) = options.modes.iter().find(|mode| !known.contains(&mode.as_str())) {
         return Err(Error::option("--modes", format!("\"{mode}\" is not one of {}", known.join(", "))));
     }

@@ -1,4 +1,5 @@
-//! raypack as an engine: a mode for every kernel, and `auto`, which chooses among them as it goes.
+//! raypack as an engine: a mode for every kernel, `auto`, which chooses among those for pictures as it goes, and
+//! `mixed`, which chooses among those for slices of rays.
 //!
 //! The single-ray and the stream kernel are given rays, the packet kernels packets, each made before the clock starts; the
 //! records go out in the kernel's own form.
@@ -11,7 +12,10 @@ use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
-use crate::traverse::{Accel, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, TileCounts};
+use crate::traverse::{
+    Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
+};
+use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -114,7 +118,7 @@ impl Ours {
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
     /// chunk, and taken up by whoever comes next: mostly the same worker.
     fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
-        let learnt = Arc::new(DispatchPool::default());
+        let learnt = Arc::new(DispatchPool::<Dispatch>::default());
         let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             let mut dispatch = shared.take();
@@ -160,28 +164,46 @@ impl Engine for Ours {
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
         let contender = |kernel| match kernel {
             Kernel::Single | Kernel::Stream => {
-                let lots = Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec);
-                Box::new(SliceRun { engine: self, kernel, lots }) as Box<dyn Contender + 'a>
+                Box::new(SliceRun { engine: self, way: Way::Named(kernel), lots: slices(rays, any_hit) })
+                    as Box<dyn Contender + 'a>
             }
             Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
             Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
             Kernel::Packet16 => self.packets::<16>(kernel, rays, any_hit),
             Kernel::Tile => self.tiles(rays, any_hit),
         };
-        Kernel::ALL.into_iter().map(contender).chain([self.auto(rays, any_hit)]).collect()
+        let mixed =
+            SliceRun { engine: self, way: Way::Mixed(DispatchPool::default()), lots: slices(rays, any_hit) };
+        let chosen: [Box<dyn Contender + 'a>; 2] = [self.auto(rays, any_hit), Box::new(mixed)];
+        Kernel::ALL.into_iter().map(contender).chain(chosen).collect()
     }
 }
 
-/// A kernel that is given rays one by one.
+/// Rays as they are, a chunk at a time.
+fn slices(rays: &[Ray], any_hit: bool) -> Vec<Lot<Vec<Ray>, Hit, bool>> {
+    Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec)
+}
+
+/// A mode that is given rays one by one.
 struct SliceRun<'a> {
     engine: &'a Ours,
-    kernel: Kernel,
+    way: Way,
     lots: Vec<Lot<Vec<Ray>, Hit, bool>>,
+}
+
+/// What traces rays that are given one by one.
+enum Way {
+    Named(Kernel),
+    Mixed(DispatchPool<SliceDispatch>),
 }
 
 impl Contender for SliceRun<'_> {
     fn mode(&self) -> String {
-        self.kernel.name().into()
+        match &self.way {
+            Way::Named(kernel) => kernel.name(),
+            Way::Mixed(_) => MIXED,
+        }
+        .into()
     }
 
     fn build_seconds(&self) -> f64 {
@@ -194,10 +216,21 @@ impl Contender for SliceRun<'_> {
 
     fn trace(&self, chunk: usize) {
         let accel = &self.engine.accel;
-        self.lots[chunk].trace(
-            |rays, hits| accel.intersect_many(self.kernel, rays, hits),
-            |rays, flags| accel.occluded_many(self.kernel, rays, flags),
-        );
+        let lot = &self.lots[chunk];
+        match &self.way {
+            Way::Named(kernel) => lot.trace(
+                |rays, hits| accel.intersect_many(*kernel, rays, hits),
+                |rays, flags| accel.occluded_many(*kernel, rays, flags),
+            ),
+            Way::Mixed(learnt) => {
+                let dispatch = RefCell::new(learnt.take());
+                lot.trace(
+                    |rays, hits| dispatch.borrow_mut().intersect(accel, rays, hits),
+                    |rays, flags| dispatch.borrow_mut().occluded(accel, rays, flags),
+                );
+                learnt.put(dispatch.into_inner());
+            }
+        }
     }
 
     fn results(&self) -> Results {
@@ -205,8 +238,11 @@ impl Contender for SliceRun<'_> {
     }
 }
 
-/// The mode that finds out which kernel is quickest.
+/// The mode that finds out which kernel is quickest for squares of a picture.
 pub const AUTO: &str = "auto";
+
+/// The mode that finds out which kernel is quickest for slices of rays.
+pub const MIXED: &str = "mixed";
 
 /// Packets in a tile.
 const TILE: usize = 16;
