@@ -73,7 +73,8 @@ pub struct Args {
     accuracy: AccuracyOption,
     #[command(flatten)]
     cache: CacheArgs,
-    /// Write what each pixel's ray costs instead of what it sees, or how many rays it casts for an effect: .png in
+    /// Write what each pixel's ray costs instead of what it sees, or how many rays its samples cast for an effect (uses,
+    /// such as look-ups of textures, of one that casts none; samples beyond the first of antialiasing): .png in
     /// colours, .exr or .pfm as numbers
     #[arg(
         long,
@@ -171,7 +172,7 @@ impl Args {
         settings: RenderSettings,
         shown: heat::Shown,
     ) -> Result<()> {
-        let heat::Shown::Rays(effect) = shown else {
+        let heat::Shown::Effect(effect) = shown else {
             if self.samples.is_some() {
                 return Err(Error::option(
                     "--samples",
@@ -197,7 +198,7 @@ impl Args {
         }
     }
 
-    /// Draws how many rays pixels cast for an effect.
+    /// Draws how many rays pixels cast for an effect, or how often they use it.
     fn heat_of(
         &self,
         scene: &Scene,
@@ -209,15 +210,17 @@ impl Args {
         let size = settings.size;
         let lighting = scene.reading(|| self.lighting(&camera, scene))?;
         let staged = self.looks.stage(scene, surface, &camera, lighting, (self.samples, !self.no_shadows))?;
-        let settings = RenderSettings { samples: staged.samples, ..settings };
+        let shadows = staged.analysis.set().has(Effect::Shadows);
+        let settings = RenderSettings { samples: staged.samples, shadows, ..settings };
         let mut renderer = Renderer::new(&scene.accel, surface, settings)?;
         if let Some(appearance) = &staged.appearance {
             renderer = renderer.with_appearance(appearance)?;
         }
         let tiles_done = AtomicUsize::new(0);
         let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / renderer.tile_count() as f64;
-        let counts = watch("counting", fraction, || renderer.rays_of(effect, &camera, &tiles_done))?;
-        let shown = heat::Shown::Rays(effect);
+        let counts =
+            watch("counting", fraction, || renderer.counts_of(effect, &camera, &lighting, &tiles_done))?;
+        let shown = heat::Shown::Effect(effect);
         heat::give(scene, camera, size, shown, &counts, self.outputs.picture(), &self.json)
     }
 

@@ -21,7 +21,7 @@ mod stats;
 mod tile;
 
 pub use bounded::{First, FirstStats};
-pub use effects::{Appearance, EffectCosts, FINE, Limits, MANY, Staged, Wishes, memory_beside};
+pub use effects::{Appearance, EffectCost, EffectCosts, FINE, Limits, MANY, Staged, Wishes, memory_beside};
 pub use frame::Frame;
 pub use offset::offset_point;
 pub use order::{Tile, tiles};

@@ -14,7 +14,6 @@ use crate::mesh::Mesh;
 use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
-use glam::Vec3;
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -142,17 +141,29 @@ impl<'a, S: Surface> Renderer<'a, S> {
         self.drawn(&wanted).map(|drawn| (drawn.first, drawn.frame, drawn.stats))
     }
 
-    /// How many rays of an effect each pixel's samples cast, on average, row by row from the top. Of no effect, and in
-    /// a renderer that [shows none](Self::with_appearance), none.
+    /// How many rays an effect casts for each pixel's samples, or how often it is [used](super::EffectCost::uses), on
+    /// average, row by row from the top; of [`Effect::Antialiasing`], the samples of each pixel beyond its first. Nothing
+    /// of an effect that does not run.
     ///
     /// # Errors
     /// As [`frame_with_progress`](Self::frame_with_progress).
-    pub fn rays_of(&self, effect: Effect, camera: &Camera, tiles_done: &AtomicUsize) -> Result<Vec<f32>> {
-        let Some(appearance) = self.appearance else {
-            return Ok(vec![0.0; self.settings.size.pixels() as usize]);
+    pub fn counts_of(
+        &self,
+        effect: Effect,
+        camera: &Camera,
+        lighting: &Lighting,
+        tiles_done: &AtomicUsize,
+    ) -> Result<Vec<f32>> {
+        // The plain renderer counts nothing pixel by pixel: what it does is done by the other one.
+        let plain;
+        let appearance = match self.appearance {
+            Some(appearance) => appearance,
+            None => {
+                plain = Appearance::plain(lighting, self.settings.shadows);
+                &plain
+            }
         };
-        let lighting = Lighting::outdoors(Vec3::Y, Vec3::Y);
-        let wanted = Wanted { camera, lighting: &lighting, tiles_done, limit: None };
+        let wanted = Wanted { camera, lighting, tiles_done, limit: None };
         let count = || self.drawn_with_effects(appearance, &wanted, Some(effect)).frame;
         let frame = match self.accel.cached() {
             Some(cached) => cached.or_error(count)?,
@@ -291,7 +302,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             threads,
             pinned: outcome.pinned,
             samples: samples as f64 / size.pixels() as f64,
-            costs: EffectCosts::new(appearance.set, &costs, threads),
+            costs: EffectCosts::new(appearance.set, &costs, threads, seconds),
         };
         Drawn { first: None, frame, stats }
     }

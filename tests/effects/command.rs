@@ -3,6 +3,7 @@
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const CAMERA: &str = "eye=0,1.9,6.6;at=0,1.5,0;fov=48";
@@ -73,6 +74,18 @@ fn a_render_says_what_each_effect_cost() {
     let rays = |name: &str| costs.iter().find(|cost| cost["effect"] == name).map(|cost| &cost["rays"]);
     assert!(rays("reflection").and_then(Value::as_u64).expect("it ran") > 0);
     assert_eq!(rays("shadows"), None, "the lamp is no point");
+    for cost in costs {
+        let number = |key: &str| cost[key].as_f64().unwrap_or_else(|| panic!("{key} of {cost}"));
+        let (counted, other) = match cost["effect"].as_str().expect("a name") {
+            "textures" | "bump" | "smooth-normals" | "emission" | "highlights" | "fresnel" => {
+                ("uses", "rays")
+            }
+            "antialiasing" => panic!("it was not called for"),
+            _ => ("rays", "uses"),
+        };
+        assert!(number(counted) >= 1.0 && number(other) == 0.0, "{cost}");
+        assert!(number("seconds") >= 0.0 && number("share") >= 0.0 && number("rays_per_s") >= 0.0, "{cost}");
+    }
     assert!(picture.is_file());
 }
 
@@ -96,23 +109,46 @@ fn a_scene_file_and_a_part_of_it_give_the_same_picture() {
 }
 
 #[test]
-fn heat_is_drawn_of_effects_that_cast_rays() {
+fn heat_is_drawn_of_effects() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("heat.pfm");
-    let heat = |effect: &str| {
+    let heat = |effect: &str, mean: Range<f64>| {
         let mut command = raypack();
         command.arg("render").arg(gallery()).args(["--camera", CAMERA, "--size", "32x24", "--samples", "2"]);
-        command.args(["--heatmap", effect]).arg("-o").arg(&file);
-        command
+        let (report, _) = report(command.args(["--heatmap", effect]).arg("-o").arg(&file));
+        assert_eq!(report["heatmap"], effect);
+        let spread = &report["spread"];
+        assert!(spread["greatest"].as_f64().expect("a number") >= 1.0, "{spread}");
+        assert!(mean.contains(&spread["mean"].as_f64().expect("a number")), "{effect}: {spread}");
+        fs::remove_file(&file).expect("it was written");
     };
-    let (report, _) = report(&mut heat("reflection"));
-    assert_eq!(report["heatmap"], "reflection");
-    let spread = &report["spread"];
-    assert!(spread["greatest"].as_f64().expect("a number") >= 1.0, "{spread}");
-    assert!(spread["mean"].as_f64().expect("a number") < 1.0, "most pixels see no mirror: {spread}");
-    assert!(file.is_file());
-    let message = refusal(&mut heat("textures"));
-    assert!(message.contains("--heatmap: textures casts no rays"), "{message}");
+    // Most pixels see no mirror, and most of what they see has a picture on it, if only by way of other surfaces.
+    heat("reflection", 0.0..1.0);
+    heat("textures", 1.0..9.0);
+    let mut command = raypack();
+    command.arg("render").arg(gallery()).args(["--heatmap", "warmth"]).arg("-o").arg(&file);
+    let message = refusal(&mut command);
+    assert!(message.contains("--heatmap: \"warmth\" is not one of"), "{message}");
+}
+
+#[test]
+fn shadows_of_plain_scenes_are_counted_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let scene = "v -5 0 -5\nv -5 0 5\nv 5 0 5\nv 5 0 -5\nf 1 2 3 4\nv -1 1 -1\nv -1 1 1\nv 1 1 1\nf 5 6 7\n";
+    fs::write(path("plain.obj"), scene).expect("written");
+    let render = |heat: &[&str], to: &str| {
+        let mut command = raypack();
+        command.arg("render").arg(path("plain.obj")).args(["--size", "32x32", "--samples", "2"]);
+        report(command.args(heat).arg("-o").arg(path(to))).0
+    };
+    let plain = render(&[], "plain.png");
+    let [cost] = &plain["costs"].as_array().expect("a list")[..] else { panic!("{plain}") };
+    assert_eq!((&cost["effect"], &cost["rays"]), (&"shadows".into(), &plain["shadow"]["rays"]));
+    assert!(cost["rays"].as_u64().expect("a number") > 0);
+    let heat = render(&["--heatmap", "shadows"], "heat.pfm");
+    let mean = heat["spread"]["mean"].as_f64().expect("a number");
+    assert_eq!((mean * 2.0 * 32.0 * 32.0).round(), cost["rays"].as_f64().expect("a number"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Pictures do not depend on how the machine makes them.
 
-use crate::scenes::{Builder, Shot};
+use crate::scenes::{Builder, Shot, counts};
 use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::{Channel, Image, ImageSource, Map, Material, Mesh};
@@ -9,7 +9,7 @@ use raypack::store;
 use raypack::traverse::{Accel, Kernel};
 
 /// A room with a lamp, a mirror, glass, a glossy floor, a picture on a wall, a veil and leaves.
-fn room() -> Mesh {
+pub fn room() -> Mesh {
     let picture = image::RgbaImage::from_fn(32, 16, |x, y| {
         image::Rgba([8 * x as u8, 16 * y as u8, 99, if (x / 4 + y / 4) % 2 == 0 { 255 } else { 0 }])
     });
@@ -55,7 +55,7 @@ fn room() -> Mesh {
     scene.mesh()
 }
 
-fn shot() -> Shot {
+pub fn shot() -> Shot {
     Shot {
         size: 40,
         samples: Some(3),
@@ -76,17 +76,20 @@ fn the_picture_is_the_same_for_all_threads_tiles_kernels_and_instruction_sets() 
         let casts =
             matches!(effect, SoftShadows | Reflection | Glossy | Refraction | Transparency | Interreflection);
         assert!(!casts || cost.rays > 0, "{effect} ran and cast nothing");
+        assert!(cost.count() > 0, "{effect} ran and did nothing");
     }
     for isa in Isa::available() {
         let accel = accel.clone().with_isa(isa);
         for (kernel, tile, threads) in
             [(Kernel::Tile, 32, 2), (Kernel::Tile, 5, 3), (Kernel::Stream, 16, 2), (Kernel::Packet16, 64, 1)]
         {
-            let (frame, _) = shot().with(&accel, &mesh, |settings| {
+            let (frame, again) = shot().with(&accel, &mesh, |settings| {
                 (settings.tuning.packet, settings.tuning.tile, settings.tuning.threads) =
                     (kernel, tile, threads);
             });
-            assert!(frame.color == expected.color, "{kernel} on {isa}, tiles of {tile}, {threads} threads");
+            let machine = format!("{kernel} on {isa}, tiles of {tile}, {threads} threads");
+            assert!(frame.color == expected.color, "{machine}");
+            assert_eq!(counts(&again), counts(&stats), "{machine}");
         }
     }
 }

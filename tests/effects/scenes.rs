@@ -4,8 +4,10 @@ use raypack::Vec3;
 use raypack::kdtree::BuildParams;
 use raypack::mesh::{Attributes, Colors, Image, Material, Mesh};
 use raypack::render::{Frame, FrameStats, Limits, RenderSettings, Renderer, Size, Staged, Wishes};
+use raypack::scene::effects::Effect;
 use raypack::scene::{Camera, Environment, Lighting, Surface};
 use raypack::traverse::Accel;
+use std::sync::atomic::AtomicUsize;
 
 /// A scene that is put together from squares.
 #[derive(Default)]
@@ -109,6 +111,19 @@ impl Shot {
         RenderSettings::new(Size { width: self.size, height: self.size })
     }
 
+    /// The rays or uses of an effect, pixel by pixel.
+    pub fn heat(&self, accel: &Accel, mesh: &Mesh, effect: Effect) -> Vec<f32> {
+        let staged = self.staged(accel, mesh);
+        let settings = RenderSettings { samples: staged.samples, ..self.settings() };
+        let mut renderer = Renderer::new(accel, mesh, settings).expect("sound settings");
+        if let Some(appearance) = &staged.appearance {
+            renderer = renderer.with_appearance(appearance).expect("sound limits");
+        }
+        renderer
+            .counts_of(effect, &self.camera, &self.lighting, &AtomicUsize::new(0))
+            .expect("it is in memory")
+    }
+
     /// Renders with changed settings.
     pub fn with(
         &self,
@@ -119,7 +134,7 @@ impl Shot {
         let staged = self.staged(accel, surface);
         let mut settings = self.settings();
         settings.samples = staged.samples;
-        settings.shadows = staged.analysis.set().has(raypack::scene::effects::Effect::Shadows);
+        settings.shadows = staged.analysis.set().has(Effect::Shadows);
         change(&mut settings);
         let mut renderer = Renderer::new(accel, surface, settings).expect("sound settings");
         if let Some(appearance) = &staged.appearance {
@@ -137,6 +152,11 @@ impl Shot {
     pub fn mean(&self, mesh: &Mesh) -> Vec3 {
         mean(&self.of(mesh).0)
     }
+}
+
+/// The effects that ran, and how many rays or uses each had.
+pub fn counts(stats: &FrameStats) -> Vec<(Effect, u64)> {
+    stats.costs.iter().map(|(effect, cost)| (effect, cost.count())).collect()
 }
 
 pub fn mean(frame: &Frame) -> Vec3 {

@@ -1,6 +1,6 @@
 //! What a scene does not call for costs nothing.
 
-use crate::scenes::{Builder, Shot};
+use crate::scenes::{Builder, Shot, counts};
 use raypack::Vec3;
 use raypack::mesh::{Material, Mesh};
 use raypack::scene::effects::Effect;
@@ -17,7 +17,7 @@ fn scene(material: Material) -> Mesh {
 /// The effects that ran, and how many rays each cast.
 fn rays(mesh: &Mesh, effects: &'static str) -> Vec<(Effect, u64)> {
     let shot = Shot { effects, samples: Some(2), ..Shot::new(Vec3::new(3.0, 4.0, 5.0), Vec3::Y) };
-    shot.of(mesh).1.costs.iter().map(|(effect, count)| (effect, count.rays)).collect()
+    counts(&shot.of(mesh).1)
 }
 
 fn shiny() -> Material {

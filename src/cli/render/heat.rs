@@ -3,7 +3,7 @@
 use crate::cli::progress::watch;
 use crate::cli::report::{ENGINE, Engine, Json, Lines};
 use crate::cli::scene::{Scene, SceneReport};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::render::Size;
 use crate::render::image::write_heat;
 use crate::scene::Camera;
@@ -20,31 +20,23 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub enum Shown {
     /// What a ray through the middle costs.
     Cost(Cost),
-    /// The rays that a sample casts for an effect, on average.
-    Rays(Effect),
+    /// The rays that a sample casts for an effect, or how often it uses it, on average.
+    Effect(Effect),
 }
 
 impl Shown {
     /// Reads `--heatmap`.
     ///
     /// # Errors
-    /// There is no such thing, or an effect casts no rays.
+    /// There is no such thing.
     pub fn parse(name: &str) -> Result<Self> {
-        let Ok(effect) = name.parse::<Effect>() else { return name.parse().map(Self::Cost) };
-        if effect.casts_rays() {
-            return Ok(Self::Rays(effect));
-        }
-        let others: Vec<&str> =
-            Effect::ALL.iter().filter(|effect| effect.casts_rays()).map(|effect| effect.name()).collect();
-        let message =
-            format!("{effect} casts no rays of its own; of effects these do: {}", others.join(", "));
-        Err(Error::option("--heatmap", message))
+        name.parse().map(Self::Effect).or_else(|()| name.parse().map(Self::Cost))
     }
 
     fn name(self) -> &'static str {
         match self {
             Self::Cost(cost) => cost.name(),
-            Self::Rays(effect) => effect.name(),
+            Self::Effect(effect) => effect.name(),
         }
     }
 }
@@ -98,8 +90,9 @@ pub fn give(
     lines.add("camera", camera.to_string());
     let unit = if heatmap == Shown::Cost(Cost::Time) { " ns" } else { "" };
     let of = match heatmap {
-        Shown::Cost(_) => "of a pixel's ray, traced alone",
-        Shown::Rays(_) => "rays for each sample of a pixel",
+        Shown::Cost(_) => "of a pixel's ray, traced alone".to_owned(),
+        Shown::Effect(Effect::Antialiasing) => "samples of a pixel beyond its first".to_owned(),
+        Shown::Effect(effect) => format!("{} for each sample of a pixel", effect.unit()),
     };
     let Spread { mean, median, percentile_99, greatest } = spread;
     lines.add(

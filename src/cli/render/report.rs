@@ -60,7 +60,7 @@ pub struct Report<'a> {
     total: RayCount,
     /// All effects, whether they ran, and what called for them.
     effects: &'a [Call],
-    /// What those that ran cost, of all frames together, if the plain renderer did not do.
+    /// What those that ran cost, of all frames together.
     #[serde(skip_serializing_if = "EffectCosts::is_empty")]
     costs: EffectCosts,
     /// Seconds of shading beside them, if the plain renderer did not do.
@@ -89,6 +89,9 @@ impl<'a> Report<'a> {
             RayCount::of(rays, seconds)
         };
         let costs = frames.iter().fold(EffectCosts::default(), |costs, shot| costs.and(&shot.stats.costs));
+        let (shadow, total) = (sum(|stats| stats.shadow), sum(|stats| stats.total));
+        let shading_seconds = (!costs.is_empty()).then(|| costs.shading());
+        let costs = if costs.is_empty() { EffectCosts::plain(shadow, total.seconds) } else { costs };
         Self {
             engine: ENGINE,
             scene: scene.report(),
@@ -103,10 +106,10 @@ impl<'a> Report<'a> {
             samples: settings.samples,
             shadows: settings.shadows,
             camera: sum(|stats| stats.camera),
-            shadow: sum(|stats| stats.shadow),
-            total: sum(|stats| stats.total),
+            shadow,
+            total,
             effects,
-            shading_seconds: (!costs.is_empty()).then(|| costs.shading()),
+            shading_seconds,
             costs,
             cache,
             frames,
@@ -169,20 +172,16 @@ impl<'a> Report<'a> {
 }
 
 impl Report<'_> {
-    /// A line for each effect that ran: its rays, its time, its part of the frame, and what called for it.
+    /// A line for each effect that ran: its rays or uses, its time, its part of the frame, and what called for it.
     fn describe_effects(&self, lines: &mut Lines) {
         let frame = self.total.seconds;
         let shading = self.costs.shading();
         if shading > 0.0 {
             lines.add("shading", format!("{}, {:.1} %", duration(shading), 100.0 * shading / frame));
         }
-        for (effect, count) in self.costs.iter() {
-            let cost = if count.rays > 0 || count.seconds > 0.0 {
-                let share = 100.0 * count.seconds / frame;
-                format!("{} rays, {}, {share:.1} %", grouped(count.rays), duration(count.seconds))
-            } else {
-                "no rays of its own".into()
-            };
+        for (effect, cost) in self.costs.iter() {
+            let (count, share) = (grouped(cost.count()), 100.0 * cost.share);
+            let cost = format!("{count} {}, {}, {share:.1} %", effect.unit(), duration(cost.seconds));
             let call = self.effects.iter().find(|call| call.name == effect).expect("all are there");
             lines.add("effect", format!("{effect:<18} {cost}; {}", callers(call)));
         }

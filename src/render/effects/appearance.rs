@@ -8,7 +8,7 @@ use super::wave::{LetsPass, World};
 use crate::error::{Error, Result};
 use crate::scene::effects::{Effect, EffectSet, calls_for, calls_of, used};
 use crate::scene::texture::Textures;
-use crate::scene::{Lights, Surface};
+use crate::scene::{Lighting, Lights, Surface};
 use crate::traverse::{Accel, Kernel};
 use glam::Vec3;
 use serde::Serialize;
@@ -91,6 +91,18 @@ impl Limits {
 }
 
 impl Appearance {
+    /// What the plain renderer shows.
+    pub(crate) fn plain(lighting: &Lighting, shadows: bool) -> Self {
+        let Lighting { key, ambient } = *lighting;
+        let (key, ambient) = (Some(key), Some(ambient));
+        Self {
+            set: EffectSet::NONE.with(Effect::Shadows, shadows),
+            lights: Lights { key, ambient, emitters: None, environment: None },
+            textures: Textures::default(),
+            limits: Limits::default(),
+        }
+    }
+
     /// All that paths meet in a scene.
     pub(crate) fn world<'a, S: Surface>(
         &'a self,

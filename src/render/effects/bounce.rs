@@ -1,5 +1,6 @@
 //! Where light goes on from a surface.
 
+use super::meter::Meter;
 use super::path::{Path, Use, Way};
 use super::point::Point;
 use crate::geometry::Ray;
@@ -60,11 +61,12 @@ impl Bounce {
         sequence: &Sequence,
         weight: Vec3,
         next: &mut Queues,
+        meter: &mut impl Meter,
     ) -> Scattered {
         let material = point.material;
         const OF_GLASS: EffectSet = EffectSet::of(&[Effect::Refraction, Effect::Reflection]);
         if material.transmission != Vec3::ZERO && self.set.has_any(OF_GLASS) {
-            return self.transparent(path, point, sequence, weight, next);
+            return self.transparent(path, point, sequence, weight, next, meter);
         }
         let is_smooth = point.roughness < SMOOTH;
         let effect = if is_smooth { Effect::Reflection } else { Effect::Glossy };
@@ -77,7 +79,13 @@ impl Bounce {
             return Scattered { matt: weight * point.diffuse, ..Scattered::default() };
         }
         let curved = material.fresnel && self.set.has(Effect::Fresnel);
-        let shown = |cosine: f32| if curved { schlick(point.specular, cosine) } else { point.specular };
+        let mut shown = |cosine: f32| {
+            if curved {
+                meter.measure(Effect::Fresnel, || schlick(point.specular, cosine))
+            } else {
+                point.specular
+            }
+        };
         let reflectance = shown(point.normal.dot(point.toward));
         if is_smooth {
             self.mirror(path, point, sequence, weight * reflectance, next);
@@ -91,14 +99,7 @@ impl Bounce {
                 let weight = weight * shown(sample.cos_facet) * sample.weight;
                 // The lobe's width blurs what pictures show in it.
                 let spread = path.cone.spread + 0.25 * point.roughness;
-                self.send(
-                    path,
-                    point,
-                    sequence,
-                    Way::Glossy,
-                    (point.origin(false), toward, weight, spread),
-                    next,
-                );
+                self.send(path, point, sequence, Way::Glossy, (point.origin(), toward, weight, spread), next);
             }
         }
         Scattered {
@@ -116,6 +117,7 @@ impl Bounce {
         sequence: &Sequence,
         weight: Vec3,
         next: &mut Queues,
+        meter: &mut impl Meter,
     ) -> Scattered {
         let material = point.material;
         let is_thin = material.ior == 1.0;
@@ -129,10 +131,12 @@ impl Bounce {
         let curved = material.fresnel && self.set.has(Effect::Fresnel);
         let reflected = match (bent, is_thin) {
             (None, _) => Vec3::ONE,
-            (_, true) if material.reflects && curved => schlick(point.specular, cosine),
+            (_, true) if material.reflects && curved => {
+                meter.measure(Effect::Fresnel, || schlick(point.specular, cosine))
+            }
             (_, true) if material.reflects => point.specular,
             (_, true) => Vec3::ZERO,
-            (_, false) if curved => Vec3::splat(dielectric(cosine, eta)),
+            (_, false) if curved => Vec3::splat(meter.measure(Effect::Fresnel, || dielectric(cosine, eta))),
             // What Fresnel's equations say of light that comes straight on.
             (_, false) => Vec3::splat(dielectric(1.0, eta)),
         };
@@ -163,7 +167,7 @@ impl Bounce {
         let toward = (-point.toward).reflect(point.normal);
         // A normal that is not the triangle's may throw light into the surface.
         if point.face.dot(toward) > 0.0 {
-            let going = (point.origin(false), toward, weight, path.cone.spread);
+            let going = (point.origin(), toward, weight, path.cone.spread);
             self.send(path, point, sequence, Way::Reflection, going, next);
         }
     }
@@ -210,7 +214,7 @@ impl Bounce {
             weight /= stays;
         }
         // A hemisphere's share of a cone: pictures are seen as plain colours from there on.
-        let going = (point.origin(false), toward, weight, path.cone.spread.max(0.25));
+        let going = (point.origin(), toward, weight, path.cone.spread.max(0.25));
         self.send(path, point, sequence, Way::Diffuse, going, next);
     }
 

@@ -1,6 +1,7 @@
 //! Light that comes to a matt surface straight from where it is made.
 
 use super::bounce::Scattered;
+use super::meter::Meter;
 use super::path::{Path, Use};
 use super::point::Point;
 use crate::geometry::Ray;
@@ -22,6 +23,14 @@ pub struct LightRay {
     pub light: Vec3,
 }
 
+/// Where the light of a surface goes.
+pub struct Gathered<'a> {
+    /// What arrives whatever is in the way.
+    pub sum: &'a mut Vec3,
+    /// What depends on that.
+    pub rays: &'a mut Vec<LightRay>,
+}
+
 /// The smoothest surface on which lights make highlights: that of a light without extent is invisible on a mirror.
 const SHARPEST: f32 = 0.03;
 
@@ -40,8 +49,7 @@ pub struct Direct<'a> {
 }
 
 impl Direct<'_> {
-    /// Adds to `sum` the light that arrives at a matt surface whatever is in the way, and to `rays` what depends on
-    /// that. `scattered` is the part that the eye gets of what arrives; `looks_around` says whether the path goes on
+    /// Gathers the light that arrives at a matt surface. `scattered` is the part that the eye gets of what arrives; `looks_around` says whether the path goes on
     /// to look for light by chance, which may be the same light.
     #[inline]
     pub fn gather(
@@ -50,8 +58,8 @@ impl Direct<'_> {
         point: &Point<'_>,
         sequence: &Sequence,
         (scattered, looks_around): (&Scattered, bool),
-        sum: &mut Vec3,
-        rays: &mut Vec<LightRay>,
+        Gathered { sum, rays }: Gathered<'_>,
+        meter: &mut impl Meter,
     ) {
         let matt = scattered.matt;
         let mut add = |effect: Effect, ray: Ray, light: Vec3| {
@@ -63,18 +71,19 @@ impl Direct<'_> {
                 *sum += light;
             }
         };
-        let origin = point.origin(true);
+        let origin = point.origin_to_light(meter);
         if let Some(light) = &self.lights.key {
             let way = light.from(origin);
-            let light = self.key(point, &way, scattered);
+            let light = self.key(point, &way, scattered, meter);
             add(Effect::Shadows, Ray::segment(origin, way.toward, 0.0, way.distance), light);
         }
         for time in 0..self.samples {
             let random = |what| path.random_of(sequence, what, time);
-            if let Some(found) = self.light_of_surfaces(point, origin, scattered, looks_around, random) {
+            let scattered = (scattered, looks_around);
+            if let Some(found) = self.light_of_surfaces(point, origin, scattered, random, meter) {
                 add(Effect::SoftShadows, found.0, found.1);
             }
-            if let Some(found) = self.light_from_afar(point, origin, scattered, looks_around, random) {
+            if let Some(found) = self.light_from_afar(point, origin, scattered, random, meter) {
                 add(Effect::Environment, found.0, found.1);
             }
         }
@@ -99,9 +108,9 @@ impl Direct<'_> {
         &self,
         point: &Point<'_>,
         origin: Vec3,
-        scattered: &Scattered,
-        looks_around: bool,
+        (scattered, looks_around): (&Scattered, bool),
         random: impl Fn(Use) -> [f32; 2],
+        meter: &mut impl Meter,
     ) -> Option<(Ray, Vec3)> {
         let emitters = self.lights.emitters.as_ref()?;
         let light = emitters.sample_for(origin, random(Use::Light), random(Use::LightPlace));
@@ -115,7 +124,7 @@ impl Direct<'_> {
         }
         let count = self.samples as f32;
         let by_angle = by_solid_angle(light.pdf_area, way, light.normal);
-        let thrown = self.thrown(point, toward, scattered, looks_around, by_angle * count);
+        let thrown = self.thrown(point, toward, (scattered, looks_around), by_angle * count, meter);
         let part = cosines / (distance * distance * light.pdf_area * count);
         // Short of the light, which would hide itself.
         Some((Ray::segment(origin, way, 0.0, 1.0 - 1e-4), thrown * light.radiance * part))
@@ -126,9 +135,9 @@ impl Direct<'_> {
         &self,
         point: &Point<'_>,
         origin: Vec3,
-        scattered: &Scattered,
-        looks_around: bool,
+        (scattered, looks_around): (&Scattered, bool),
         random: impl Fn(Use) -> [f32; 2],
+        meter: &mut impl Meter,
     ) -> Option<(Ray, Vec3)> {
         let sample = self.lights.environment.as_ref()?.sample(random(Use::Environment));
         let toward = sample.direction;
@@ -137,7 +146,7 @@ impl Direct<'_> {
             return None;
         }
         let count = self.samples as f32;
-        let thrown = self.thrown(point, toward, scattered, looks_around, sample.pdf * count);
+        let thrown = self.thrown(point, toward, (scattered, looks_around), sample.pdf * count, meter);
         Some((Ray::new(origin, toward), thrown * sample.radiance * (cosine / (sample.pdf * count))))
     }
 
@@ -147,12 +156,16 @@ impl Direct<'_> {
         &self,
         point: &Point<'_>,
         toward: Vec3,
-        scattered: &Scattered,
-        looks_around: bool,
+        (scattered, looks_around): (&Scattered, bool),
         on_purpose: f32,
+        meter: &mut impl Meter,
     ) -> Vec3 {
         let share = share(looks_around, on_purpose, point.normal.dot(toward));
-        let gloss = self.lobe(point, toward, SHARPEST_OF_WIDE);
+        let gloss = if scattered.lights == Vec3::ZERO {
+            0.0
+        } else {
+            self.lobe(point, toward, SHARPEST_OF_WIDE, meter)
+        };
         scattered.matt * (FRAC_1_PI * share) + scattered.lights * gloss
     }
 
@@ -175,27 +188,34 @@ impl Direct<'_> {
     /// Light of the key light. Its irradiance is what a white surface that faces it throws back: that divided by
     /// pi.
     #[inline]
-    fn key(&self, point: &Point<'_>, way: &ShadowRay, scattered: &Scattered) -> Vec3 {
+    fn key(&self, point: &Point<'_>, way: &ShadowRay, scattered: &Scattered, meter: &mut impl Meter) -> Vec3 {
         let cosine = point.normal.dot(way.toward);
         if cosine <= 0.0 || point.face.dot(way.toward) <= 0.0 {
             return Vec3::ZERO;
         }
-        (scattered.matt + scattered.points * (PI * self.lobe(point, way.toward, SHARPEST)))
-            * way.irradiance
-            * cosine
+        let gloss =
+            if scattered.points == Vec3::ZERO { 0.0 } else { self.lobe(point, way.toward, SHARPEST, meter) };
+        (scattered.matt + scattered.points * (PI * gloss)) * way.irradiance * cosine
     }
 
     /// How much of the light from `toward` a surface throws to the eye near the mirror's direction, for each unit of
     /// its specular reflectance.
     #[inline]
-    fn lobe(&self, point: &Point<'_>, toward: Vec3, sharpest: f32) -> f32 {
-        const LOBES: EffectSet = EffectSet::of(&[Effect::Highlights, Effect::Glossy]);
-        if !self.set.has_any(LOBES) || point.specular == Vec3::ZERO {
+    fn lobe(&self, point: &Point<'_>, toward: Vec3, sharpest: f32, meter: &mut impl Meter) -> f32 {
+        let effect = if point.material.reflects { Effect::Glossy } else { Effect::Highlights };
+        if !self.set.has(effect) || point.specular == Vec3::ZERO {
             return 0.0;
         }
-        let basis = Basis::of(point.normal);
-        let [wo, wi] = [point.toward, toward].map(|v| basis.to_local(v));
-        ggx::evaluate(wo, wi, point.roughness.max(sharpest), |_| Vec3::ONE).x
+        let evaluate = || {
+            let basis = Basis::of(point.normal);
+            let [wo, wi] = [point.toward, toward].map(|v| basis.to_local(v));
+            ggx::evaluate(wo, wi, point.roughness.max(sharpest), |_| Vec3::ONE).x
+        };
+        match effect {
+            Effect::Highlights => meter.measure(effect, evaluate),
+            // Counted by its rays.
+            _ => evaluate(),
+        }
     }
 }
 

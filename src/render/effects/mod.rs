@@ -16,13 +16,15 @@
 //! | `direct` | light straight from where it is made |
 //! | `bounce` | light that goes on: mirrors, glass, matt surfaces |
 //! | `holes` | where pictures cut holes into surfaces |
-//! | `cost` | rays and time by effect |
+//! | `meter` | what shading does for effects that cast no rays: counted, and timed for a few hits |
+//! | `cost` | rays, uses and time by effect |
 
 mod appearance;
 mod bounce;
 mod cost;
 mod direct;
 mod holes;
+mod meter;
 mod path;
 mod point;
 mod setup;
@@ -31,7 +33,7 @@ mod trace;
 mod wave;
 
 pub use appearance::{Appearance, Limits};
-pub use cost::EffectCosts;
 pub(super) use cost::Tallies;
+pub use cost::{EffectCost, EffectCosts};
 pub use setup::{FINE, MANY, Staged, Wishes, memory_beside};
 pub(super) use task::{EffectScratch, EffectTask};

@@ -1,6 +1,7 @@
 //! Places on surfaces that rays have met, with all that light does there.
 
 use super::holes::opacity;
+use super::meter::Meter;
 use super::path::Path;
 use crate::geometry::Hit;
 use crate::mesh::{Attributes, Material, Normal};
@@ -59,7 +60,13 @@ pub struct Resolver<'a> {
 impl<'a> Resolver<'a> {
     /// The place that a path's ray has hit. With `MAPS` surfaces may have pictures and normals.
     #[inline]
-    pub fn resolve<const MAPS: bool>(&self, surfaces: &impl Look, path: &Path, hit: &Hit) -> Point<'a> {
+    pub fn resolve<const MAPS: bool>(
+        &self,
+        surfaces: &impl Look,
+        path: &Path,
+        hit: &Hit,
+        meter: &mut impl Meter,
+    ) -> Point<'a> {
         let Detail { corners, color, material: number, attributes } =
             surfaces.detail(hit.primitive, hit.u, hit.v);
         let material = self.materials.get(number as usize).unwrap_or(&MATT);
@@ -88,7 +95,7 @@ impl<'a> Resolver<'a> {
             emission: material.emission,
         };
         if MAPS {
-            self.map(&mut point, &attributes, path);
+            self.map(&mut point, &attributes, path, meter);
         }
         if !self.set.has(Effect::Transparency) {
             point.opacity = 1.0;
@@ -96,11 +103,25 @@ impl<'a> Resolver<'a> {
         point
     }
 
+    /// What a surface is that a ray has hit, and the share of it that is there, at its finest.
+    pub fn opacity(&self, surfaces: &impl Look, hit: &Hit) -> (&'a Material, f32) {
+        let Detail { material, attributes, .. } = surfaces.detail(hit.primitive, hit.u, hit.v);
+        let material = self.materials.get(material as usize).unwrap_or(&MATT);
+        if material.cutoff.is_some() || !self.set.has(Effect::Transparency) {
+            return (material, 1.0);
+        }
+        (material, opacity(material, self.textures, attributes.uv_at(hit.u, hit.v), 0.0))
+    }
+
     /// Looks up what normals and pictures say.
-    fn map(&self, point: &mut Point<'a>, attributes: &Attributes, path: &Path) {
+    fn map(&self, point: &mut Point<'a>, attributes: &Attributes, path: &Path, meter: &mut impl Meter) {
         if self.set.has(Effect::SmoothNormals) {
-            match attributes.normal_at(point.u, point.v) {
-                Some(normal) => point.normal = if normal.dot(point.face) < 0.0 { -normal } else { normal },
+            let normal = meter.time(Effect::SmoothNormals, || attributes.normal_at(point.u, point.v));
+            match normal {
+                Some(normal) => {
+                    meter.note(Effect::SmoothNormals, 1);
+                    point.normal = if normal.dot(point.face) < 0.0 { -normal } else { normal };
+                }
                 None => point.normals = [Normal::NONE; 3],
             }
         } else {
@@ -113,41 +134,51 @@ impl<'a> Resolver<'a> {
             let width = path.cone.width_at(point.distance);
             let print = footprint(&point.corners, &attributes.uv, width, cosine);
             if self.set.has(Effect::Textures) {
-                self.color(point, uv, print);
+                let uses = meter.time(Effect::Textures, || self.color(point, uv, print));
+                meter.note(Effect::Textures, uses);
             }
             if self.set.has(Effect::Transparency) && point.material.cutoff.is_none() {
                 point.opacity = opacity(point.material, self.textures, uv, print);
             }
             if self.set.has(Effect::Bump) {
-                self.bump(point, attributes, uv, print);
+                let uses = meter.time(Effect::Bump, || self.bump(point, attributes, uv, print));
+                meter.note(Effect::Bump, uses);
             }
         }
         point.normal = consistent_normal(point.toward, point.face, point.normal);
     }
 
-    fn color(&self, point: &mut Point<'a>, uv: Vec2, print: f32) {
+    /// Looks pictures up, and says how many.
+    fn color(&self, point: &mut Point<'a>, uv: Vec2, print: f32) -> u32 {
         let maps = &point.material.maps;
+        let mut uses = 0;
         if let Some(map) = &maps.diffuse {
             point.diffuse *= self.textures.color(map, uv, print);
+            uses += 1;
         }
         if let Some(map) = &maps.specular {
             point.specular *= self.textures.color(map, uv, print);
+            uses += 1;
         }
         if let Some(map) = &maps.roughness {
             point.roughness *= self.textures.value(map, uv, print);
+            uses += 1;
         }
         if let Some(map) = &maps.emission {
             point.emission *= self.textures.color(map, uv, print);
+            uses += 1;
         }
+        uses
     }
 
-    /// Tilts the normal as height and normal maps say.
-    fn bump(&self, point: &mut Point<'a>, attributes: &Attributes, uv: Vec2, print: f32) {
+    /// Tilts the normal as height and normal maps say, and says how many were looked up.
+    fn bump(&self, point: &mut Point<'a>, attributes: &Attributes, uv: Vec2, print: f32) -> u32 {
         let maps = &point.material.maps;
         if maps.normal.is_none() && maps.bump.is_none() {
-            return;
+            return 0;
         }
-        let Some([along_u, along_v]) = tangents(&point.corners, &attributes.uv) else { return };
+        let Some([along_u, along_v]) = tangents(&point.corners, &attributes.uv) else { return 0 };
+        let mut uses = 0;
         // The maps are made for the front.
         let side = if point.is_front { 1.0 } else { -1.0 };
         let up = point.normal * side;
@@ -155,6 +186,7 @@ impl<'a> Resolver<'a> {
             let n = self.textures.normal(map, uv, print);
             let tilted = along_u.normalize_or_zero() * n.x + along_v.normalize_or_zero() * n.y + up * n.z;
             point.normal = tilted.normalize_or(up) * side;
+            uses += 1;
         }
         if let Some(map) = &maps.bump {
             // The surface rises by the slope along each tangent; heights are in units of the coordinates, so that a
@@ -162,7 +194,9 @@ impl<'a> Resolver<'a> {
             let slope = self.textures.gradient(map, uv, print);
             let tilted = up - along_u.normalize_or_zero() * slope.x - along_v.normalize_or_zero() * slope.y;
             point.normal = tilted.normalize_or(up) * side;
+            uses += 1;
         }
+        uses
     }
 }
 
@@ -178,16 +212,23 @@ fn tangents([a, b, c]: &[Vec3; 3], uv: &[[f32; 2]; 3]) -> Option<[Vec3; 2]> {
 }
 
 impl Point<'_> {
-    /// Where a ray starts that leaves on the side that the path came from; for one to a light, moved off the flat
-    /// triangle to where the smooth surface would be.
+    /// Where a ray starts that leaves on the side that the path came from.
     #[inline]
-    pub fn origin(&self, to_light: bool) -> Vec3 {
-        let off = offset_point(&self.corners.map(|p| p.to_array()), self.u, self.v, self.face);
-        if !to_light || self.normals.contains(&Normal::NONE) {
+    pub fn origin(&self) -> Vec3 {
+        offset_point(&self.corners.map(|p| p.to_array()), self.u, self.v, self.face)
+    }
+
+    /// The same for one to a light: moved off the flat triangle to where the smooth surface would be.
+    #[inline]
+    pub fn origin_to_light(&self, meter: &mut impl Meter) -> Vec3 {
+        let off = self.origin();
+        if self.normals.contains(&Normal::NONE) {
             return off;
         }
-        let normals = self.normals.map(Normal::decode);
-        off + terminator_offset(self.corners, normals, self.u, self.v, self.face)
+        off + meter.time(Effect::SmoothNormals, || {
+            let normals = self.normals.map(Normal::decode);
+            terminator_offset(self.corners, normals, self.u, self.v, self.face)
+        })
     }
 
     /// Where a ray starts that goes through the surface.

@@ -1,5 +1,6 @@
 //! Tiles of a picture that shows effects: their pixels in small squares, sample by sample.
 
+use super::cost::Usage;
 use super::path::{Path, Use, Way};
 use super::wave::{Seen, Waves, World};
 use crate::render::frame::TilePixels;
@@ -22,7 +23,7 @@ pub struct EffectTask<'a, S> {
     /// The standard error of a pixel's brightness, as displays show it from 0 to 1, at which it has samples enough;
     /// 0 takes all of them.
     pub error: f32,
-    /// Counts the rays of this effect instead of adding up light.
+    /// Gives the rays or uses of this effect in place of the light.
     pub counted: Option<Effect>,
 }
 
@@ -41,6 +42,8 @@ pub struct EffectScratch {
     /// Light of the sample at hand, and of all so far.
     sample: Vec<Vec3>,
     sums: Vec<Vec3>,
+    /// Rays or uses of the effect that is counted.
+    counts: Vec<u32>,
     /// Of the brightness so far: its mean, and the sum of squared differences from it.
     spread: Vec<[f32; 2]>,
     /// Pixels that want more samples, in the order in which they are traced.
@@ -85,25 +88,31 @@ impl<S: Surface> EffectTask<'_, S> {
         scratch.begin(count);
         scratch.wanting.extend(in_blocks(width, height));
 
+        let mut first_done = None;
         for sample in 0..self.samples {
+            scratch.waves.counted.clear();
             self.camera_paths(scratch, sample, &in_picture);
             scratch.sample.fill(Vec3::ZERO);
-            scratch.waves.counted.clear();
             let EffectScratch { waves, paths, sample: light, seen, .. } = scratch;
             let seen = (sample == 0).then_some(seen);
             self.world.run(waves, paths, |pixel| Sequence::of(in_picture(pixel), sample), light, seen);
             if let Some(counted) = self.counted {
-                scratch.show_counts(counted);
+                scratch.count(counted);
             }
             scratch.take(self.error, sample + 1);
             if scratch.wanting.is_empty() {
                 break;
             }
+            first_done = first_done.or_else(|| Some(Instant::now()));
+        }
+        if let Some(start) = first_done.filter(|_| self.world.set.has(Effect::Antialiasing)) {
+            let more = scratch.taken.iter().map(|&taken| u64::from(taken - 1)).sum();
+            scratch.waves.tallies.uses[Effect::Antialiasing] += Usage::timed(more, start.elapsed());
         }
 
         for pixel in 0..count {
             let place = ((y + pixel as u32 / width) * tile.width + x + pixel as u32 % width) as usize;
-            pixels.color[place] = (scratch.sums[pixel] / scratch.taken[pixel].max(1) as f32).to_array();
+            pixels.color[place] = self.shown(scratch, pixel);
             let (depth, normal) = scratch.seen[pixel].unwrap_or((f32::INFINITY, Vec3::ZERO));
             if let Some(to) = pixels.depth.get_mut(place) {
                 *to = depth;
@@ -114,25 +123,41 @@ impl<S: Surface> EffectTask<'_, S> {
         }
     }
 
+    /// What a pixel of the square shows.
+    fn shown(&self, scratch: &EffectScratch, pixel: usize) -> [f32; 3] {
+        let taken = scratch.taken[pixel];
+        match self.counted {
+            None => (scratch.sums[pixel] / taken as f32).to_array(),
+            // There is no more than one for each sample, whatever a pixel costs.
+            Some(Effect::Antialiasing) if self.world.set.has(Effect::Antialiasing) => [(taken - 1) as f32; 3],
+            Some(_) => [scratch.counts[pixel] as f32 / taken as f32; 3],
+        }
+    }
+
     /// A path from the camera for each pixel that wants one.
     fn camera_paths(&self, scratch: &mut EffectScratch, sample: u32, in_picture: &impl Fn(u16) -> [u32; 2]) {
-        let has_lens = self.world.set.has(Effect::DepthOfField);
-        let spread = self.view.pixel_spread();
-        scratch.paths.clear();
-        for &pixel in &scratch.wanting {
-            let [x, y] = in_picture(pixel);
-            let mut path = Path {
-                pixel,
-                cone: Cone::new(spread),
-                ..Path::of_ray(self.view.ray(x, y, subpixel(sample)))
-            };
-            if has_lens {
+        let EffectScratch { paths, wanting, waves, samples, .. } = scratch;
+        let cone = Cone::new(self.view.pixel_spread());
+        let ray = |[x, y]: [u32; 2]| self.view.ray(x, y, subpixel(sample));
+        paths.clear();
+        paths.extend(wanting.iter().map(|&pixel| Path {
+            pixel,
+            cone,
+            ..Path::of_ray(ray(in_picture(pixel)))
+        }));
+        *samples += paths.len() as u64;
+        if self.world.set.has(Effect::DepthOfField) {
+            let start = Instant::now();
+            for path in &mut *paths {
+                let [x, y] = in_picture(path.pixel);
                 let lens = path.random(&Sequence::of([x, y], sample), Use::Lens);
                 path.ray = self.view.lens_ray(x, y, subpixel(sample), lens);
             }
-            scratch.paths.push(path);
+            waves.tallies.uses[Effect::DepthOfField] += Usage::timed(paths.len() as u64, start.elapsed());
+            if waves.counts {
+                waves.counted.extend(paths.iter().map(|path| (path.pixel, Effect::DepthOfField)));
+            }
         }
-        scratch.samples += scratch.paths.len() as u64;
     }
 }
 
@@ -143,6 +168,8 @@ impl EffectScratch {
         self.sample.resize(count, Vec3::ZERO);
         self.sums.clear();
         self.sums.resize(count, Vec3::ZERO);
+        self.counts.clear();
+        self.counts.resize(count, 0);
         self.spread.clear();
         self.spread.resize(count, [0.0; 2]);
         self.taken.clear();
@@ -152,12 +179,11 @@ impl EffectScratch {
         self.wanting.clear();
     }
 
-    /// Has the sample at hand be the number of an effect's rays.
-    fn show_counts(&mut self, counted: Effect) {
-        self.sample.fill(Vec3::ZERO);
+    /// Counts the rays or uses of an effect in the sample at hand.
+    fn count(&mut self, counted: Effect) {
         for &(pixel, effect) in &self.waves.counted {
             if effect == counted {
-                self.sample[usize::from(pixel)] += Vec3::ONE;
+                self.counts[usize::from(pixel)] += 1;
             }
         }
     }

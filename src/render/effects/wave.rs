@@ -7,13 +7,13 @@
 
 use super::bounce::{Bounce, Queues, Scattered};
 use super::cost::Tallies;
-use super::direct::{Direct, LightRay};
+use super::direct::{Direct, Gathered, LightRay};
 use super::holes::Holes;
+use super::meter::{Clock, Counting, Meter, Pace, Timing};
 use super::path::{Path, Way};
 use super::point::Resolver;
 use super::trace::Tracer;
 use crate::geometry::{Hit, Ray};
-use crate::mesh::Material;
 use crate::render::scatter::Sequence;
 use crate::render::stats::Tally;
 use crate::scene::effects::{Effect, EffectSet};
@@ -60,16 +60,18 @@ pub struct Waves {
     light_rays: Vec<Ray>,
     occluded: Vec<bool>,
     asked: Vec<usize>,
-    /// The pixels and effects of all rays, if they are to be counted.
+    clock: Clock,
+    pace: Pace,
+    /// The pixels and effects of all rays and uses, if they are to be counted.
     pub counted: Vec<(u16, Effect)>,
     /// Whether they are.
-    counts: bool,
+    pub counts: bool,
 }
 
 impl Waves {
-    /// Empty, with what has been learnt before about kernels. With `counts`, rays are counted one by one.
+    /// Empty, with what has been learnt before about kernels. With `counts`, rays and uses are counted pixel by pixel.
     pub fn new(learnt: Dispatch, counts: bool) -> Self {
-        Self { tracer: Tracer::new(learnt), counts, ..Self::default() }
+        Self { tracer: Tracer::new(learnt), clock: Clock::calibrated(), counts, ..Self::default() }
     }
 }
 
@@ -185,15 +187,38 @@ impl<S: Surface> World<'_, S> {
             calls.or(self.resolver.calls.get(number as usize).copied().unwrap_or(EffectSet::NONE))
         });
         let calls = calls.and(self.set).or(self.set.and(EffectSet::of(&[Effect::SmoothNormals])));
-        let job = Job { paths, hits: &waves.hits, sequence, surfaces: &surfaces };
-        let lights = &mut waves.lights;
+        let kernel = (calls.has_any(MAPS), calls.has_any(RAYS) || self.set.has_any(EVERYWHERE));
+        let Waves { hits, lights, tallies, clock, pace, counted, counts, .. } = waves;
         lights.clear();
-        let goes_on = calls.has_any(RAYS) || self.set.has_any(EVERYWHERE);
-        match (calls.has_any(MAPS), goes_on) {
-            (false, false) => self.shade_with::<false, false>(&job, lights, sums, next, seen),
-            (true, false) => self.shade_with::<true, false>(&job, lights, sums, next, seen),
-            (false, true) => self.shade_with::<false, true>(&job, lights, sums, next, seen),
-            (true, true) => self.shade_with::<true, true>(&job, lights, sums, next, seen),
+        let mut out = Out { lights, sums, next, seen };
+        let mut done = 0;
+        while done < paths.len() {
+            let (count, is_timed) = pace.next(paths.len() - done);
+            let part = done..done + count;
+            let job = Job { paths: &paths[part.clone()], hits: &hits[part], sequence, surfaces: &surfaces };
+            if is_timed || *counts {
+                let list = counts.then_some(&mut *counted);
+                self.shade_by(kernel, &job, &mut out, &mut Timing::new(&mut tallies.uses, *clock, list));
+            } else {
+                self.shade_by(kernel, &job, &mut out, &mut Counting(&mut tallies.uses));
+            }
+            done += count;
+        }
+    }
+
+    /// The kernel is named by whether surfaces have maps, and whether rays go on from them.
+    fn shade_by(
+        &self,
+        kernel: (bool, bool),
+        job: &Job<'_, impl Look, impl Fn(u16) -> Sequence>,
+        out: &mut Out<'_>,
+        meter: &mut impl Meter,
+    ) {
+        match kernel {
+            (false, false) => self.shade_with::<false, false>(job, out, meter),
+            (true, false) => self.shade_with::<true, false>(job, out, meter),
+            (false, true) => self.shade_with::<false, true>(job, out, meter),
+            (true, true) => self.shade_with::<true, true>(job, out, meter),
         }
     }
 
@@ -201,32 +226,35 @@ impl<S: Surface> World<'_, S> {
     fn shade_with<const MAPS: bool, const RAYS: bool>(
         &self,
         job: &Job<'_, impl Look, impl Fn(u16) -> Sequence>,
-        lights: &mut Vec<LightRay>,
-        sums: &mut [Vec3],
-        next: &mut Queues,
-        mut seen: Option<&mut Seen>,
+        out: &mut Out<'_>,
+        meter: &mut impl Meter,
     ) {
         for (path, hit) in job.paths.iter().zip(job.hits) {
-            let sum = &mut sums[path.pixel as usize];
+            let sum = &mut out.sums[path.pixel as usize];
             if !hit.is_hit() {
                 *sum += path.arriving(path.weight * self.behind(path));
                 continue;
             }
+            meter.begin(path.pixel);
             let sequence = (job.sequence)(path.pixel);
-            let point = self.resolver.resolve::<MAPS>(job.surfaces, path, hit);
-            if let Some(seen) = &mut seen {
+            let point = self.resolver.resolve::<MAPS>(job.surfaces, path, hit, meter);
+            if let Some(seen) = &mut out.seen {
                 seen[path.pixel as usize] = Some((point.distance, point.face));
             }
             let mut weight = path.weight;
             if RAYS {
-                weight *= path.media.attenuation(point.distance);
+                if path.media.absorbs() {
+                    weight *= meter.measure(Effect::Absorption, || path.media.attenuation(point.distance));
+                }
                 if point.opacity < 1.0 {
-                    self.bounce.through(path, &point, &sequence, weight * (1.0 - point.opacity), next);
+                    self.bounce.through(path, &point, &sequence, weight * (1.0 - point.opacity), out.next);
                     weight *= point.opacity;
                 }
                 if point.emission != Vec3::ZERO && self.set.has(Effect::Emission) {
-                    let share = path.share(|| self.direct.density_of(path, &point));
-                    *sum += path.arriving(weight * point.emission * share);
+                    *sum += meter.measure(Effect::Emission, || {
+                        let share = path.share(|| self.direct.density_of(path, &point));
+                        path.arriving(weight * point.emission * share)
+                    });
                 }
             }
             if point.material.unlit {
@@ -234,16 +262,17 @@ impl<S: Surface> World<'_, S> {
                 continue;
             }
             let scattered = if RAYS {
-                self.bounce.specular(path, &point, &sequence, weight, next)
+                self.bounce.specular(path, &point, &sequence, weight, out.next, meter)
             } else {
                 Scattered { matt: weight * point.diffuse, ..Scattered::default() }
             };
             if scattered != Scattered::default() {
                 let looks_around = RAYS && self.bounce.looks_around(path);
-                self.direct.gather(path, &point, &sequence, (&scattered, looks_around), sum, lights);
+                let to = Gathered { sum, rays: out.lights };
+                self.direct.gather(path, &point, &sequence, (&scattered, looks_around), to, meter);
             }
             if RAYS && self.bounce.looks_around(path) {
-                self.bounce.diffuse(path, &point, &sequence, scattered.matt, next);
+                self.bounce.diffuse(path, &point, &sequence, scattered.matt, out.next);
             }
         }
     }
@@ -311,7 +340,7 @@ impl<S: Surface> World<'_, S> {
             _ => Effect::Refraction,
         };
         let start = Instant::now();
-        let Waves { tracer, lights, occluded, rays, hits, asked, tallies, .. } = waves;
+        let Waves { tracer, lights, occluded, rays, hits, asked, tallies, counted, counts, .. } = waves;
         let may_pass = |light: &LightRay| match light.effect {
             _ if self.holes.is_some() => true,
             Effect::Shadows | Effect::AmbientOcclusion => points,
@@ -322,6 +351,9 @@ impl<S: Surface> World<'_, S> {
         let mut cast = 0;
         if let (Some(holes), Effect::CutOuts) = (&self.holes, effect) {
             cast += asked.len() as u64;
+            if *counts {
+                counted.extend(asked.iter().map(|&i| (lights[i].pixel, effect)));
+            }
             tracer.occluded_sifted(self.accel, holes, lights, asked, occluded);
         } else {
             // Layer by layer, each taking its part of the light.
@@ -335,6 +367,9 @@ impl<S: Surface> World<'_, S> {
                 hits.resize(rays.len(), Hit::MISS);
                 tracer.intersect(self.accel, self.kernel, Way::Through, rays, hits);
                 cast += rays.len() as u64;
+                if *counts {
+                    counted.extend(asked.iter().map(|&i| (lights[i].pixel, effect)));
+                }
                 let surfaces = self.surface.reader();
                 let mut place = 0;
                 asked.retain(|&i| {
@@ -362,15 +397,24 @@ impl<S: Surface> World<'_, S> {
         {
             return Vec3::ONE;
         }
-        let path = Path::of_ray(light.ray);
-        let point = self.resolver.resolve::<true>(surfaces, &path, hit);
-        let material: &Material = point.material;
+        let (material, opacity) = self.resolver.opacity(surfaces, hit);
         let passes =
             material.ior == 1.0 || matches!(light.effect, Effect::Shadows | Effect::AmbientOcclusion);
         let gone_through =
             if passes && self.set.has(Effect::Refraction) { material.transmission } else { Vec3::ZERO };
-        Vec3::splat(1.0 - point.opacity) + gone_through * point.opacity
+        Vec3::splat(1.0 - opacity) + gone_through * opacity
     }
+}
+
+/// Where what shading makes goes.
+struct Out<'a> {
+    /// Rays to lights.
+    lights: &'a mut Vec<LightRay>,
+    /// Light, by pixel.
+    sums: &'a mut [Vec3],
+    /// Paths that go on.
+    next: &'a mut Queues,
+    seen: Option<&'a mut Seen>,
 }
 
 /// Paths that are to be shaded, and what they hit.

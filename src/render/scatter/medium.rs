@@ -94,6 +94,12 @@ impl Media {
         }
     }
 
+    /// Whether light is lost in the medium around the ray.
+    #[inline]
+    pub fn absorbs(&self) -> bool {
+        self.innermost().is_some_and(|medium| medium.absorption != Vec3::ZERO)
+    }
+
     /// What is left of light that has come this far through the medium around the ray (Beer and Lambert): all of it
     /// outside of everything. `length` is not negative and may be infinite.
     #[inline]

@@ -97,6 +97,30 @@ impl Effect {
                 | Self::Environment
         )
     }
+
+    /// What is counted of it: rays, if it [casts](Self::casts_rays) some, or else what it does with each hit or sample.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Textures | Self::Bump => "look-ups",
+            Self::SmoothNormals => "normals",
+            Self::Emission => "lights seen",
+            Self::Highlights => "highlights",
+            Self::Fresnel => "reflectances",
+            Self::Absorption => "ways inside",
+            Self::DepthOfField => "lens points",
+            Self::Antialiasing => "more samples",
+            Self::CutOuts
+            | Self::Transparency
+            | Self::Shadows
+            | Self::SoftShadows
+            | Self::Reflection
+            | Self::Glossy
+            | Self::Refraction
+            | Self::AmbientOcclusion
+            | Self::Interreflection
+            | Self::Environment => "rays",
+        }
+    }
 }
 
 impl fmt::Display for Effect {
@@ -190,6 +214,13 @@ mod tests {
             assert_eq!(effect.name().parse(), Ok(effect));
         }
         assert_eq!("shine".parse::<Effect>(), Err(()));
+    }
+
+    #[test]
+    fn rays_are_counted_of_what_casts_them() {
+        for &effect in Effect::ALL {
+            assert_eq!(effect.casts_rays(), effect.unit() == "rays", "{effect}");
+        }
     }
 
     #[test]
