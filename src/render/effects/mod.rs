@@ -10,6 +10,7 @@
 //! |---|---|
 //! | `task` | tiles, squares, samples; when a pixel has enough of them |
 //! | `wave` | wave after wave: trace, shade, light |
+//! | `shade` | what a wave's rays hit: by the least of four kernels |
 //! | `path` | a ray, and what has become of the light by the time it is where the ray is |
 //! | `trace` | which kernel gets which rays |
 //! | `point` | a place on a surface: normals, pictures |
@@ -28,6 +29,7 @@ mod meter;
 mod path;
 mod point;
 mod setup;
+mod shade;
 mod task;
 mod trace;
 mod wave;
