@@ -86,6 +86,11 @@ pub enum Part {
 pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
     let count = chunks.iter().map(Vec::len).sum();
     if count < SMALL || count > place.in_flight {
+        if count >= SMALL && context.ledger.is_limited() {
+            // What one thread builds of so many is on the ledger too late.
+            context.ledger.give_up();
+            return leaf(context, chunks, &place);
+        }
         let references = chunks.concat();
         context.ledger.add(bytes_of(&references));
         free(context, chunks);

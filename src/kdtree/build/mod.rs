@@ -41,6 +41,16 @@ impl BuildProgress {
         self.millionths.load(Ordering::Relaxed) as f64 * 1e-6
     }
 
+    /// How much is done, to [go back to](Self::go_back).
+    pub(super) fn mark(&self) -> u64 {
+        self.millionths.load(Ordering::Relaxed)
+    }
+
+    /// What was done since then was in vain.
+    pub(super) fn go_back(&self, mark: u64) {
+        self.millionths.store(mark, Ordering::Relaxed);
+    }
+
     /// A part of 1 more is done. Parts are tiny: what is rounded away shows as a bar that ends a little short
     /// of full.
     pub(super) fn add(&self, share: f64) {
@@ -132,7 +142,7 @@ pub(super) enum Verdict {
 impl Context<'_> {
     /// The cost model of a node that may be split at all.
     pub fn may_split(&self, count: usize, place: &Place) -> Option<CellCost<'_>> {
-        if count <= self.params.min_leaf || place.depth >= self.depth_limit {
+        if count <= self.params.min_leaf || place.depth >= self.depth_limit || self.ledger.is_over() {
             return None;
         }
         CellCost::new(self.params, place.cell)

@@ -88,14 +88,14 @@ impl List {
         OnShelf { list: self, job }
     }
 
-    /// Takes all into memory and off the shelf.
-    pub fn load(self, job: &Job<'_>) -> Result<Vec<Vec<Reference>>> {
-        let load = |piece: &Piece| {
-            let references = piece.load(job)?;
-            piece.clear(job.shelf);
-            Ok(references)
-        };
-        self.0.par_iter().map(load).collect()
+    /// Takes all into memory; it stays on the shelf.
+    pub fn load(&self, job: &Job<'_>) -> Result<Vec<Vec<Reference>>> {
+        self.0.par_iter().map(|piece| piece.load(job)).collect()
+    }
+
+    /// Takes all off the shelf.
+    pub fn clear(self, job: &Job<'_>) {
+        self.0.iter().for_each(|piece| piece.clear(job.shelf));
     }
 
     /// The primitive ids, off the shelf.

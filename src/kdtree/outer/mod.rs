@@ -26,6 +26,7 @@
 mod crown;
 mod list;
 mod part;
+mod sizes;
 
 use super::build::{Context, Place, Verdict, budget_of, large};
 use super::lines::{AFTER, MAX_LINE, MAX_RECORD};
@@ -41,6 +42,7 @@ use crate::simd::Chosen;
 pub use crown::Plan;
 use crown::Top;
 use list::List;
+use sizes::Sizes;
 
 /// All triangles, in the tree's coordinates, wherever they are. Their ids count from 0.
 pub trait Triangles: Sync {
@@ -144,6 +146,8 @@ pub struct Outline {
     pub plan: Plan,
     /// How many parts were built in memory.
     pub parts: usize,
+    /// How many were begun that did not fit.
+    pub given_up: usize,
 }
 
 /// A part's triangles go by their places in it: what each takes to be called by its own id again.
@@ -153,20 +157,25 @@ const NAME: usize = size_of::<u32>();
 const LEAST_PART: usize = 4 * large::CHUNK;
 
 impl BuildParams {
-    /// How many references a part that is built in so many bytes may have.
+    /// How large parts that are built in so many bytes may be.
     ///
     /// # Errors
     /// The least memory that does, if that is more.
-    fn part_in(&self, memory: usize) -> Result<usize, usize> {
+    fn parts_in(&self, memory: usize) -> Result<Sizes, usize> {
         let fixed = self.peak_bytes(0) + list::passes_bytes();
         let each = (self.peak_bytes(1 << 20) - self.peak_bytes(0)).div_ceil(1 << 20) + NAME;
-        let part = memory.saturating_sub(fixed) / each;
-        if part < LEAST_PART { Err(fixed + LEAST_PART * each) } else { Ok(part) }
+        let memory = memory.saturating_sub(fixed);
+        let sure = memory / each;
+        if sure < LEAST_PART {
+            Err(fixed + LEAST_PART * each)
+        } else {
+            Ok(Sizes::new(sure.max(4 * self.page), memory))
+        }
     }
 
     /// The least memory that [`build`] takes.
     pub fn least_outer_bytes(&self) -> usize {
-        self.part_in(0).expect_err("nothing fits into nothing")
+        self.parts_in(0).expect_err("nothing fits into nothing")
     }
 }
 
@@ -175,21 +184,21 @@ impl BuildParams {
 /// # Errors
 /// The memory does not do, the tree would be too large to address, or something cannot be read or written.
 pub fn build(job: &Job<'_>, output: &mut dyn Output) -> Result<Outline> {
-    let part = job.params.part_in(job.memory).map_err(|least| {
+    let sizes = job.params.parts_in(job.memory).map_err(|least| {
         Error::Mesh(format!("building its tree takes {least} bytes at least, not {}", job.memory))
     })?;
-    in_parts(job, part.max(4 * job.params.page), output)
+    in_parts(job, sizes, output)
 }
 
-/// The same in parts of at most so many references.
-fn in_parts(job: &Job<'_>, part: usize, output: &mut dyn Output) -> Result<Outline> {
+/// The same in parts that are no larger than these.
+fn in_parts(job: &Job<'_>, sizes: Sizes, output: &mut dyn Output) -> Result<Outline> {
     let count = job.triangles.count();
     let budget = budget_of(count, job.params).min(MAX_RECORD);
     let place = Place::of_root(job.bounds, count, budget);
     let mut builder = Builder {
         job,
         output,
-        part,
+        sizes,
         depth_limit: job.params.depth_limit(count),
         ledger: Ledger::default(),
         lengths: [0; Array::ALL.len()],
@@ -199,6 +208,7 @@ fn in_parts(job: &Job<'_>, part: usize, output: &mut dyn Output) -> Result<Outli
         spread: Spread::default(),
         pieces: Vec::new(),
         parts: 0,
+        given_up: 0,
     };
     let root = builder.pair()?;
     let top = builder.node(List::of_triangles(count), place, root.first())?;
@@ -209,8 +219,8 @@ fn in_parts(job: &Job<'_>, part: usize, output: &mut dyn Output) -> Result<Outli
 struct Builder<'a> {
     job: &'a Job<'a>,
     output: &'a mut dyn Output,
-    /// The most references of a part that is built in memory.
-    part: usize,
+    /// What is built in memory.
+    sizes: Sizes,
     depth_limit: usize,
     ledger: Ledger,
     /// How many elements each array has.
@@ -223,6 +233,7 @@ struct Builder<'a> {
     /// How many lines each piece of them has, in the order in which they were appended.
     pieces: Vec<usize>,
     parts: usize,
+    given_up: usize,
 }
 
 /// Places of a node in the full tree and in the upper one.
@@ -279,8 +290,12 @@ impl Builder<'_> {
     /// Builds a node and all that is below it.
     fn node(&mut self, list: List, place: Place, places: Places) -> Result<Top> {
         let count = list.count();
-        if count <= self.part {
-            return self.part(list, place, places);
+        let is_sure = count <= self.sizes.sure;
+        if (is_sure || self.sizes.may_fit(count, place.budget))
+            && let Some(part) = self.part(&list, place, places, is_sure)?
+        {
+            list.clear(self.job);
+            return Ok(part);
         }
         let params = self.job.params;
         let context = Context {
@@ -346,6 +361,7 @@ impl Builder<'_> {
             peak: self.ledger.peak(),
             plan,
             parts: self.parts,
+            given_up: self.given_up,
         })
     }
 }

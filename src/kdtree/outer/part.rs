@@ -5,9 +5,9 @@ use super::list::{List, read_scattered};
 use super::{Array, Builder, Patch, Places};
 use crate::error::Result;
 use crate::geometry::Aabb;
-use crate::kdtree::build::{Built, Context, Place, Reference, large};
+use crate::kdtree::build::{BuildProgress, Built, Context, Place, Reference, large};
 use crate::kdtree::lines::{self, Line};
-use crate::kdtree::memory::bytes_of;
+use crate::kdtree::memory::{bytes_of, finishing_bytes};
 use crate::kdtree::node::Node;
 use crate::kdtree::pages::{Pages, sort_and_dedup};
 use crate::kdtree::spread;
@@ -18,8 +18,35 @@ use rayon::prelude::*;
 const LEVELS: usize = 3;
 
 impl Builder<'_> {
-    /// Builds a node in memory, and appends what is below it.
-    pub(super) fn part(&mut self, list: List, place: Place, places: Places) -> Result<Top> {
+    /// Builds a node in memory, and appends what is below it. `None` if it turns out that it does not fit, which what
+    /// `is_sure` to fit does.
+    pub(super) fn part(
+        &mut self,
+        list: &List,
+        place: Place,
+        places: Places,
+        is_sure: bool,
+    ) -> Result<Option<Top>> {
+        let mark = self.job.progress.map(BuildProgress::mark);
+        self.ledger.begin((!is_sure).then_some(self.sizes.memory));
+        let Some(built) = self.built(list, place)? else {
+            self.ledger.begin(None);
+            self.sizes.raise();
+            self.given_up += 1;
+            if let Some((progress, mark)) = self.job.progress.zip(mark) {
+                progress.go_back(mark);
+            }
+            return Ok(None);
+        };
+        self.sizes.learn(list.count(), built.nodes.len(), built.references.len());
+        let top = self.append_part(built, &place, places)?;
+        // What splits from files has no limit here.
+        self.ledger.begin(None);
+        Ok(Some(top))
+    }
+
+    /// The nodes and references below a node, on the ledger; `None` if they, or what is made of them, do not fit.
+    fn built(&self, list: &List, place: Place) -> Result<Option<Built>> {
         let mut chunks = list.load(self.job)?;
         // Primitives ascend: within the part, a triangle goes by its place among them.
         let primitives: Vec<u32> = chunks.iter().flatten().map(Reference::primitive).collect();
@@ -42,12 +69,20 @@ impl Builder<'_> {
             ledger: &self.ledger,
             progress: self.job.progress,
         };
-        let Built { nodes, mut references } = large::build(&context, chunks, place).gathered(&self.ledger);
+        let part = large::build(&context, chunks, place);
+        let finishing = finishing_bytes(part.nodes() as f64, part.references() as f64) as usize;
+        // They are copied first, beside the triangles, and then finished.
+        let copies = part.nodes() * size_of::<Node>() + part.references() * size_of::<u32>();
+        if self.ledger.is_over() || self.ledger.has_no_room(copies) {
+            return Ok(None);
+        }
+        let Built { nodes, mut references } = part.gathered(&self.ledger);
         drop(triangles);
         references.par_iter_mut().for_each(|reference| *reference = primitives[*reference as usize]);
         drop(primitives);
         self.ledger.sub(held);
-        self.append_part(Built { nodes, references }, &place, places)
+        let more = finishing.saturating_sub(bytes_of(&nodes) + bytes_of(&references));
+        Ok((!self.ledger.has_no_room(more)).then_some(Built { nodes, references }))
     }
 
     /// One leaf of all references, though they are too many to be built in memory.

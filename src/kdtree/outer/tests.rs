@@ -94,8 +94,14 @@ impl Arrived {
     }
 }
 
-/// Builds a mesh's tree in memory and in parts, and compares them byte for byte; in how many parts.
+/// Builds a mesh's tree in memory and in parts that are sure to fit, and compares them byte for byte; in how many
+/// parts.
 fn compare(mesh: &Mesh, params: &BuildParams, part: usize) -> usize {
+    compare_in(mesh, params, Sizes::new(part, 0)).parts
+}
+
+/// The same in parts of any sizes.
+fn compare_in(mesh: &Mesh, params: &BuildParams, sizes: Sizes) -> Outline {
     let tree = KdTree::build(mesh, params, None).expect("builds");
     let (triangles, shelf) = (Whole(tree.triangles()), Shelves::new(usize::MAX));
     let progress = BuildProgress::default();
@@ -108,7 +114,7 @@ fn compare(mesh: &Mesh, params: &BuildParams, part: usize) -> usize {
         progress: Some(&progress),
     };
     let mut arrived = Arrived::default();
-    let outline = in_parts(&job, part, &mut arrived).expect("builds");
+    let outline = in_parts(&job, sizes, &mut arrived).expect("builds");
 
     let Arrays { nodes, references, upper, beneath, pages, lines, .. } = tree.arrays();
     assert!(arrived.lines(&outline.plan) == lines, "lines");
@@ -129,7 +135,7 @@ fn compare(mesh: &Mesh, params: &BuildParams, part: usize) -> usize {
     assert_eq!(outline.stats, tree.stats());
     assert_eq!(shelf.in_use(), 0, "all that was put on the shelf was taken off");
     assert!((0.9..=1.01).contains(&progress.fraction()), "{}", progress.fraction());
-    outline.parts
+    outline
 }
 
 #[test]
@@ -162,6 +168,27 @@ fn what_no_plane_divides_is_one_leaf() {
 }
 
 #[test]
+fn parts_that_may_fit_are_tried_and_given_up_if_they_do_not() {
+    let mesh = shapes::soup(120_000, 5);
+    let params = BuildParams::default();
+    let memory = 8 << 20;
+    let [sure, tried] = [0, memory].map(|memory| compare_in(&mesh, &params, Sizes::new(8192, memory)));
+    assert!(2 * tried.parts < sure.parts, "{} parts, {} are sure to fit", tried.parts, sure.parts);
+    assert!(2 * sure.peak < tried.peak && tried.peak <= memory, "{} bytes, {}", tried.peak, sure.peak);
+
+    // Of a tree that is finer than anybody would guess who believes that next to nothing becomes of references.
+    let mesh = shapes::soup(60_000, 5);
+    let params = BuildParams { min_leaf: 1, traversal_cost: 0.1, ..BuildParams::default() };
+    let memory = 4 << 20;
+    let mut rash = Sizes::new(8192, memory);
+    rash.learn(1 << 40, 1, 1);
+    let rash = compare_in(&mesh, &params, rash);
+    assert!(rash.given_up > 0 && rash.parts > 1, "{} given up, {} parts", rash.given_up, rash.parts);
+    // What was begun in vain has stopped soon: within what every thread keeps for itself.
+    assert!(rash.peak <= memory + (4 << 20), "{} bytes", rash.peak);
+}
+
+#[test]
 fn faults_are_told() {
     let tree = KdTree::build(&shapes::soup(40_000, 2), &BuildParams::default(), None).expect("builds");
     let triangles = Whole(tree.triangles());
@@ -170,8 +197,11 @@ fn faults_are_told() {
         let bounds = *tree.bounds();
         let job = Job { triangles: &triangles, bounds, params, memory, shelf: &shelf, progress: None };
         let mut arrived = Arrived::default();
-        let built =
-            if memory == 0 { build(&job, &mut arrived) } else { in_parts(&job, memory, &mut arrived) };
+        let built = if memory == 0 {
+            build(&job, &mut arrived)
+        } else {
+            in_parts(&job, Sizes::new(memory, 0), &mut arrived)
+        };
         built.map(|_| ()).expect_err("it cannot be built").to_string()
     };
     let params = BuildParams::default();
