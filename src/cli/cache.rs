@@ -19,9 +19,10 @@ use std::path::PathBuf;
 
 /// Fly a camera path through caches of a scene file: budgets, policies, ways of loading
 ///
-/// Each cache flies the path twice: cold, from nothing, and warm, with what the first flight has left. The
-/// table has rays per second by frame, as the seed paper's (Portelli, "Out-of-core rendering of massive data
-/// sets"), beside the resident scene and the best that any policy could have done.
+/// Each cache flies the path twice: cold, from nothing, and warm, with what the first flight has left. A table
+/// has them all, beside the resident scene and the best that any policy could have done. Then come rays per
+/// second as in the tables of the seed paper (Portelli, "Out-of-core rendering of massive data sets"): one for
+/// each share in memory and way of loading, a row a frame, a column a policy.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// The scene: a .rpk file, as raypack build makes it
