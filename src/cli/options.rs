@@ -36,8 +36,8 @@ pub struct BuildOptions {
     /// Settings for building and rendering: a name in profiles/ or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = profile::DEFAULT)]
     profile: String,
-    /// How much time the build may take, in place of the profile's settings for it: preview builds in some
-    /// half of the time a tree for a first look, best takes 1.6 times as long for rays that are a little quicker
+    /// How much time the build may take, in place of the profile's settings for it: preview builds in a
+    /// third to a half of the time a tree for a first look, best takes 1.6 times as long for rays that are a little quicker
     #[arg(long, value_name = "preview|standard|best")]
     preset: Option<String>,
     /// The memory that model and build may take, as 512MiB or 2GiB: the tree is made coarser to fit, and

@@ -44,6 +44,10 @@ pub struct BuildParams {
     /// bundle). Real models have some 5; with a `traversal_cost` near 1 they would have 10. Start
     /// from 8; `--memory` lowers it to what fits.
     pub max_duplication: f32,
+    /// Whether planes are looked for at the ends of triangles, and triangles that a plane cuts are clipped to each
+    /// of its sides ("perfect splits"). `false` takes boundaries of bins and cuts boxes: the build takes half of the
+    /// time, leaves list triangles that do not reach into them, and rays are some tenths slower.
+    pub perfect: bool,
     /// A subtree of at most this many triangles is a page, in which a tile of rays looks at all
     /// triangles at once. Raising it saves tiles steps and costs them tests; 64 is a good start.
     pub page: usize,
@@ -62,6 +66,7 @@ impl Default for BuildParams {
             bins: 32,
             exact_below: 32,
             max_duplication: 8.0,
+            perfect: true,
             page: 64,
         }
     }

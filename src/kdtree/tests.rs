@@ -61,6 +61,8 @@ fn trees_are_whole() {
         BuildParams::default(),
         BuildParams { exact_below: 0, bins: 8, min_leaf: 1, ..Default::default() },
         BuildParams { exact_below: usize::MAX, empty_bonus: 0.0, traversal_cost: 0.2, ..Default::default() },
+        BuildParams { perfect: false, exact_below: 0, bins: 16, min_leaf: 1, ..Default::default() },
+        BuildParams::preset(Preset::Preview),
     ];
     for params in &params {
         for seed in 0..4 {
@@ -80,6 +82,14 @@ fn a_large_soup_pays_off() {
     assert!(stats.references_per_triangle < 6.0, "{stats:?}");
     assert!(stats.depth <= 36);
     assert_eq!(stats.leaf_histogram.iter().sum::<usize>(), stats.leaves);
+}
+
+#[test]
+fn perfect_splits_cut_less() {
+    let params =
+        |perfect| BuildParams { perfect, exact_below: 0, max_duplication: 100.0, ..Default::default() };
+    let [rough, perfect] = [false, true].map(|perfect| checked(&soup(5_000, 1.0, 1), &params(perfect)));
+    assert!(perfect.expected_tests < 0.95 * rough.expected_tests, "{perfect:?}, {rough:?}");
 }
 
 #[test]
@@ -227,8 +237,8 @@ fn the_tree_does_not_depend_on_threads_however_the_mesh_strains() {
 #[test]
 fn memory_and_depth_are_bounded_as_announced() {
     for (number, mesh) in strained().iter().enumerate() {
-        for traversal_cost in [3.0, 0.01] {
-            let params = BuildParams { traversal_cost, max_duplication: 4.0, ..Default::default() };
+        for (traversal_cost, perfect) in [(3.0, true), (0.01, true), (3.0, false), (0.01, false)] {
+            let params = BuildParams { traversal_cost, perfect, max_duplication: 4.0, ..Default::default() };
             let announced = params.peak_bytes(mesh.triangles.len());
             let tree = KdTree::build(mesh, &params, None).expect("builds");
             assert!(tree.build_peak() <= announced, "{number}: {} of {announced}", tree.build_peak());

@@ -158,6 +158,17 @@ impl Table {
         Some(boundary)
     }
 
+    /// The split at a boundary, or at an end of the references' extent if that is cheaper.
+    pub fn coarse(
+        &self,
+        boundary: &Boundary,
+        frame: &Frame,
+        costs: &CellCost,
+        count: usize,
+    ) -> Option<Split> {
+        cheaper(ends_of_extent(frame, costs, count), self.split(boundary, frame, costs))
+    }
+
     /// The split at a boundary.
     fn split(&self, boundary: &Boundary, frame: &Frame, costs: &CellCost) -> Split {
         let Boundary { axis, bin, below, above } = *boundary;

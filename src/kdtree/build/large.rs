@@ -160,6 +160,9 @@ pub fn best_split<G: Gather>(
     let Some(boundary) = table.best_boundary(&frame, costs, count) else {
         return Ok(binned::ends_of_extent(&frame, costs, count));
     };
+    if !params.perfect {
+        return Ok(table.coarse(&boundary, &frame, costs, count));
+    }
     let gathered = |mut events: Vec<Event>, chunk: &[Reference]| {
         boundary.gather(chunk, &frame, &mut events);
         events
@@ -177,7 +180,8 @@ pub fn best_split<G: Gather>(
 fn divide(context: &Context, chunks: Chunks, split: &Split) -> [Chunks; 2] {
     let divided = |divider: &mut Divider, mut chunk: Vec<Reference>| {
         let before = bytes_of(&chunk);
-        let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split).to_vec();
+        let clips = context.params.perfect;
+        let below = divider.divide(context.isa, &mut chunk, 0, context.triangles, split, clips).to_vec();
         context.ledger.add(bytes_of(&below));
         chunk.shrink_to_fit();
         context.ledger.sub(before - bytes_of(&chunk));

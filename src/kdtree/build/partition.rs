@@ -34,7 +34,7 @@ impl Divider {
     /// Every reference goes to each side that its part in the cell reaches into: a triangle that only
     /// touches the plane stays on its own side, one that lies in the plane goes to the side that the
     /// split names. One that crosses is clipped to both sides, and left out of a side that its true
-    /// shape does not reach (its bounds had overstated it).
+    /// shape does not reach (its bounds had overstated it). Unless `clips`, its bounds are cut instead.
     pub fn divide<T: Lookup + ?Sized>(
         &mut self,
         isa: Chosen,
@@ -42,13 +42,15 @@ impl Divider {
         start: usize,
         triangles: &T,
         split: &Split,
+        clips: bool,
     ) -> &[Reference] {
         let count = references.len() - start;
         if self.below.len() < count {
             self.below.resize(count, Reference::NONE);
         }
         let (list, below) = (&mut references[start..], &mut self.below[..count]);
-        let (stay, go) = isa.run(Division { list, below, triangles, split, clipper: &mut self.clipper });
+        let (stay, go) =
+            isa.run(Division { list, below, triangles, split, clips, clipper: &mut self.clipper });
         references.truncate(start + stay);
         &self.below[..go]
     }
@@ -61,6 +63,7 @@ struct Division<'a, T: ?Sized> {
     below: &'a mut [Reference],
     triangles: &'a T,
     split: &'a Split,
+    clips: bool,
     clipper: &'a mut Clipper,
 }
 
@@ -72,7 +75,7 @@ impl<T: Lookup + ?Sized> Task for Division<'_, T> {
     // instruction set.
     #[inline(always)]
     fn run<S: Simd>(self) -> (usize, usize) {
-        let Self { list, below, triangles, split, clipper } = self;
+        let Self { list, below, triangles, split, clips, clipper } = self;
         let (axis, position) = (split.axis, split.position);
         let (mut stay, mut go) = (0, 0);
         for i in 0..list.len() {
@@ -87,6 +90,13 @@ impl<T: Lookup + ?Sized> Task for Division<'_, T> {
                 list[stay] = reference;
                 go += usize::from(goes);
                 stay += usize::from(!goes);
+            } else if !clips {
+                let [mut part_below, mut part_above] = [reference.bounds(); 2];
+                (part_below.max[axis], part_above.min[axis]) = (position, position);
+                below[go] = Reference::new(reference.primitive(), &part_below);
+                list[stay] = Reference::new(reference.primitive(), &part_above);
+                go += 1;
+                stay += 1;
             } else {
                 let primitive = reference.primitive();
                 let corners = triangles.corners(primitive);

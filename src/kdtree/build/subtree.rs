@@ -70,6 +70,7 @@ impl Scratch {
             self.table.reset(params.bins);
             self.table.count(references, &frame);
             match self.table.best_boundary(&frame, costs, count) {
+                Some(boundary) if !params.perfect => self.table.coarse(&boundary, &frame, costs, count),
                 Some(boundary) => {
                     self.events.clear();
                     boundary.gather(references, &frame, &mut self.events);
@@ -108,7 +109,9 @@ impl Builder<'_> {
             return self.leaf(start);
         };
 
-        let below = self.divider.divide(context.isa, &mut self.stack, start, context.triangles, &split);
+        let clips = context.params.perfect;
+        let below =
+            self.divider.divide(context.isa, &mut self.stack, start, context.triangles, &split, clips);
         let middle = self.stack.len();
         let Some([place_below, place_above]) =
             place.children(&split, &verdict, [below.len(), middle - start], count)

@@ -115,7 +115,8 @@ impl List {
             let divide = |divider: &mut Divider, piece: &Piece| {
                 let mut references = piece.load(job)?;
                 let cut = Cut::new(job, &references, split)?;
-                let below = divider.divide(context.isa, &mut references, 0, &cut, split).to_vec();
+                let clips = context.params.perfect;
+                let below = divider.divide(context.isa, &mut references, 0, &cut, split, clips).to_vec();
                 piece.clear(job.shelf);
                 Ok([below, references])
             };
