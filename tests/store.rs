@@ -113,7 +113,7 @@ fn build_says_what_it_did() {
 fn several_models_become_one_scene() {
     let place = models();
     let text = place.succeed("build plain.ply faces.ply materials.obj -o scene.rpk");
-    assert!(text.contains("3 models") && text.contains("10 with 22 vertices"), "{text}");
+    assert!(text.contains("3 models") && text.contains("10 with 20 vertices"), "{text}");
     let said = report(&place, "info scene.rpk");
     assert_eq!(said["triangles"], 10);
     assert_eq!(said["source"], "plain.ply, faces.ply, materials.obj");

@@ -239,10 +239,11 @@ impl Args {
         );
         let packets = Kernel::of_width(report.packet).map_or("", Kernel::rays);
         let chosen = match report.kernels.values().max() {
-            Some(&most) if self.packet.is_none() => {
-                format!(" (chosen, for {:.0} % of the rays)", 100.0 * most as f64 / rays.max(1) as f64)
+            _ if self.packet.is_some() => String::new(),
+            Some(&most) if most < rays => {
+                format!(" (chosen, for {:.0} % of the rays)", 100.0 * most as f64 / rays as f64)
             }
-            _ => String::new(),
+            _ => " (chosen)".to_owned(),
         };
         let Engine { version, build } = ENGINE;
         lines.add(

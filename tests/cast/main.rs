@@ -292,6 +292,7 @@ fn the_report_says_how_it_went() {
     assert_eq!(report["triangles"], 2);
     assert_eq!((&report["rays"], &report["hits"], &report["packet"]), (&14.into(), &6.into(), &4.into()));
     assert_eq!((&report["any"], &report["accuracy"]), (&true.into(), &"exact".into()));
+    assert_eq!(report["kernels"], serde_json::json!({ "packet4": 14 }));
     assert!(report["seconds"].as_f64() > Some(0.0) && report["rays_per_s"].as_f64() > Some(0.0));
     assert!(
         report["isa"].is_string() && report["threads"].is_u64() && report["engine"]["version"].is_string()

@@ -47,10 +47,7 @@ impl Drawing for Plot<'_> {
         let Header { machine, isa, raypack, build, date, .. } = &self.report.header;
         let lines = [
             "Nanoseconds that a thread spends on a ray, by the plant's triangles".to_owned(),
-            format!(
-                "{machine}, {} threads, {isa}, raypack {raypack} ({build} build), {date}",
-                self.report.threads
-            ),
+            format!("{machine}, {}, {isa}, raypack {raypack} ({build} build), {date}", self.report.workers()),
         ];
         for (i, (line, size)) in lines.into_iter().zip([17, 11]).enumerate() {
             header.draw(&Text::new(line, (14, 8 + 24 * i as i32), (plot::FAMILY, size)))?;

@@ -86,6 +86,11 @@ impl Report {
         }
     }
 
+    /// How many threads there were, in words.
+    pub(super) fn workers(&self) -> String {
+        format!("{} thread{}", self.threads, if self.threads == 1 { "" } else { "s" })
+    }
+
     /// The engines' names, raypack's first.
     pub fn engines(&self) -> Vec<&'static str> {
         let mut names: Vec<_> = self.header.engines.iter().map(|engine| engine.name).collect();
@@ -124,11 +129,7 @@ impl fmt::Display for Report {
         let engines: Vec<String> =
             self.header.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
         writeln!(f, "Plants of growing size (seed {}), {size} x {size} rays (seed {seed})", self.plant_seed)?;
-        writeln!(
-            f,
-            "{machine}, {} threads, {isa}, raypack {raypack} ({build} build), {accuracy}",
-            self.threads
-        )?;
+        writeln!(f, "{machine}, {}, {isa}, raypack {raypack} ({build} build), {accuracy}", self.workers())?;
         writeln!(f, "{}, {date}\n", engines.join(", "))?;
         let names = self.engines();
         for rays in self.kinds() {
