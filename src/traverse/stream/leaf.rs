@@ -75,7 +75,8 @@ impl<A: Alone> Flight<A> {
                 lane = other;
             }
         }
-        let [b, c, sum] = finds.weights.map(|weight| weight.store()[lane]);
+        let [b, c, sum] = finds.weights;
+        let (b, c, sum) = (b.store()[lane], c.store()[lane], sum.store()[lane]);
         self.take(least, primitives[lane], [b / sum, c / sum])
     }
 }

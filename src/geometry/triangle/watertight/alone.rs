@@ -20,8 +20,7 @@ fn columns<L: Eight>(triangles: &[&Triangle; 8]) -> Columns {
     for four in 0..3 {
         let mut rows = [L::splat(0.0); 4];
         for (row, pair) in rows.iter_mut().enumerate() {
-            let halves = [triangles[row], triangles[row + 4]].map(|triangle| &triangle.fours()[four]);
-            *pair = L::of_fours(halves);
+            *pair = L::of_fours([&triangles[row].fours()[four], &triangles[row + 4].fours()[four]]);
         }
         for (i, column) in L::transpose_fours(rows).into_iter().enumerate() {
             let place = 4 * four + i;
@@ -35,7 +34,9 @@ impl Shear<1, f32> {
     /// Three coordinates of eight triangles, renamed.
     #[inline(always)]
     fn renamed_eight<L: Eight>(&self, columns: &[[f32; 8]; 4]) -> Lanes3<L> {
-        RENAMED[self.major.unwrap_or(2)].map(|axis| L::load(&columns[axis & 3]))
+        // No `map`: its closure might stay out of line, and be compiled without the instruction set.
+        let [i, j, k] = RENAMED[self.major.unwrap_or(2)];
+        [L::load(&columns[i & 3]), L::load(&columns[j & 3]), L::load(&columns[k & 3])]
     }
 
     /// A corner of eight triangles relative to the origin, with its coordinates renamed.
@@ -56,7 +57,10 @@ impl Shear<1, f32> {
     #[inline(always)]
     pub(crate) fn likely_of_eight<L: Eight>(&self, triangles: &[&Triangle; 8]) -> u32 {
         let [a, b, c, _] = columns::<L>(triangles);
-        likely([&a, &b, &c].map(|corner| self.shear_eight(self.translated_eight::<L>(corner)))).bits()
+        let a = self.shear_eight(self.translated_eight::<L>(&a));
+        let b = self.shear_eight(self.translated_eight::<L>(&b));
+        let c = self.shear_eight(self.translated_eight::<L>(&c));
+        likely([a, b, c]).bits()
     }
 }
 
