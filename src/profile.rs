@@ -17,7 +17,13 @@ use std::path::{Path, PathBuf};
 pub const DEFAULT: &str = "default";
 
 /// The profiles that are compiled in: names and texts.
-const BUILT_IN: [(&str, &str); 1] = [(DEFAULT, include_str!("../profiles/default.toml"))];
+const BUILT_IN: [(&str, &str); 5] = [
+    (DEFAULT, include_str!("../profiles/default.toml")),
+    ("interior", include_str!("../profiles/interior.toml")),
+    ("scan", include_str!("../profiles/scan.toml")),
+    ("cad", include_str!("../profiles/cad.toml")),
+    ("low-memory", include_str!("../profiles/low-memory.toml")),
+];
 
 /// The folder, below the current one, in which names are looked up.
 const FOLDER: &str = "profiles";
@@ -133,7 +139,7 @@ impl Profile {
         let Some((name, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) else {
             let known = BUILT_IN.map(|(name, _)| name).join(", ");
             let message = format!(
-                "there is no {FOLDER}/{name}.toml here, and only {known} is built in; give a name or a path"
+                "there is no {FOLDER}/{name}.toml here, and built in are {known}; give a name or a path"
             );
             return Err(Error::option("--profile", message));
         };
@@ -191,6 +197,19 @@ mod tests {
             for key in keys.as_table().expect("a section").keys() {
                 assert!(written[section].get(key).is_some(), "{section}.{key} is missing");
             }
+        }
+    }
+
+    #[test]
+    fn built_in_profiles_make_sense_and_say_how_they_were_found() {
+        for (name, _) in BUILT_IN {
+            let profile = Profile::built_in(name).expect(name);
+            if name == DEFAULT {
+                continue;
+            }
+            let tuned = profile.tuned.expect(name);
+            assert!(!tuned.steps.is_empty() && tuned.triangles > 0, "{name}");
+            assert!(!tuned.model.contains('/'), "{name}: {}", tuned.model);
         }
     }
 

@@ -11,7 +11,7 @@ use std::str::FromStr;
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// For a first look: planes between bins, boxes cut instead of triangles, large leaves. Builds in a third to a
-    /// half of the standard time a tree that is an eighth smaller; camera rays are a tenth to a quarter slower, and
+    /// half of the standard time a tree that is an eighth smaller; camera rays are a tenth to two fifths slower, and
     /// rays that have nothing in common up to twice.
     Preview,
     /// For most work.
