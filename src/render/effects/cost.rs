@@ -147,7 +147,7 @@ impl EffectCosts {
     }
 
     /// Of frames that the plain renderer made, in which there may have been shadows.
-    pub(crate) fn plain(shadows: RayCount, frame: f64) -> Self {
+    pub fn plain(shadows: RayCount, frame: f64) -> Self {
         let mut costs = Self { frame, ..Self::default() };
         if shadows.rays > 0 {
             costs.ran = EffectSet::of(&[Effect::Shadows]);

@@ -2,7 +2,7 @@
 //!
 //! A tree's depth grows with the logarithm of the number of triangles, and beyond the caches each step waits for
 //! memory. How much of that an engine hides shows in the growth of the time that a ray takes, not in the rate for
-//! one model. Each plant is made in memory, raced by [`bench`](super::bench) as any model is, and forgotten.
+//! one model. Each plant is made in memory, raced by [`mod@bench`] as any model is, and forgotten.
 
 #[cfg(feature = "accuracy")]
 pub mod plot;
