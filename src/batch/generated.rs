@@ -3,7 +3,7 @@
 use super::work::{CHUNK, Plan, Traced};
 use crate::geometry::{Hit, Ray};
 use crate::traverse::{Accel, Kernel};
-use std::cell::RefCell;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// A batch whose rays come from a function, some thousand at a time, so that there may be any number of them.
@@ -40,9 +40,17 @@ pub struct Generated<'a> {
     threads: usize,
 }
 
+/// A chunk's rays, hits and other answers.
+#[derive(Default)]
+struct Chunk {
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+    occluded: Vec<bool>,
+}
+
 thread_local! {
-    /// A thread's chunk: rays, hits and other answers.
-    static CHUNKS: RefCell<(Vec<Ray>, Vec<Hit>, Vec<bool>)> = const { RefCell::new((Vec::new(), Vec::new(), Vec::new())) };
+    /// A thread's chunk. It is taken out, not borrowed: `make` and `take` may trace batches of their own.
+    static CHUNK_OF_THREAD: Cell<Chunk> = Cell::default();
 }
 
 impl<'a> Generated<'a> {
@@ -69,12 +77,13 @@ impl<'a> Generated<'a> {
         take: impl Fn(Range<u64>, &[Ray], &[Hit]) + Sync,
     ) -> Traced {
         self.plan().run(self.chunks(), |tracer, numbers| {
-            CHUNKS.with_borrow_mut(|(rays, hits, _)| {
-                refill(rays, &numbers, &make);
-                hits.resize(rays.len(), Hit::MISS);
-                tracer.intersect(rays, hits);
-                take(numbers, rays, hits);
-            });
+            let mut chunk = CHUNK_OF_THREAD.take();
+            let Chunk { rays, hits, .. } = &mut chunk;
+            refill(rays, &numbers, &make);
+            hits.resize(rays.len(), Hit::MISS);
+            tracer.intersect(rays, hits);
+            take(numbers, rays, hits);
+            CHUNK_OF_THREAD.set(chunk);
         })
     }
 
@@ -85,12 +94,13 @@ impl<'a> Generated<'a> {
         take: impl Fn(Range<u64>, &[Ray], &[bool]) + Sync,
     ) -> Traced {
         self.plan().run(self.chunks(), |tracer, numbers| {
-            CHUNKS.with_borrow_mut(|(rays, _, occluded)| {
-                refill(rays, &numbers, &make);
-                occluded.resize(rays.len(), false);
-                tracer.occluded(rays, occluded);
-                take(numbers, rays, occluded);
-            });
+            let mut chunk = CHUNK_OF_THREAD.take();
+            let Chunk { rays, occluded, .. } = &mut chunk;
+            refill(rays, &numbers, &make);
+            occluded.resize(rays.len(), false);
+            tracer.occluded(rays, occluded);
+            take(numbers, rays, occluded);
+            CHUNK_OF_THREAD.set(chunk);
         })
     }
 

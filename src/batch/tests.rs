@@ -89,3 +89,18 @@ fn as_many_rays_are_to_be_made_as_were_asked_for() {
     let accel = fence();
     Generated::new(&accel, 5).with_threads(1).intersect(|_, _| (), |_, _, _| ());
 }
+
+#[test]
+fn who_takes_answers_may_trace_more() {
+    let accel = fence();
+    let all = rays(5);
+    let make = |_, chunk: &mut Vec<Ray>| chunk.extend_from_slice(&all);
+    let hits = AtomicUsize::new(0);
+    Generated::new(&accel, 5).with_threads(1).intersect(make, |_, _, outer| {
+        Generated::new(&accel, 5).with_threads(1).intersect(make, |_, _, inner| {
+            assert_eq!(inner, outer);
+            hits.fetch_add(inner.iter().filter(|hit| hit.is_hit()).count(), Ordering::Relaxed);
+        });
+    });
+    assert!(hits.into_inner() > 0);
+}

@@ -1,20 +1,18 @@
 //! `raypack accuracy MODEL`: what accuracy costs in time.
 
+use super::bench::watch;
 use super::model::Model;
 use super::options::{BuildOptions, as_option};
-use super::outputs::same_file;
+use super::outputs::check_plot;
 use super::report::Json;
 use crate::error::{Error, Result};
-use crate::files::check_writable;
 use crate::render::{Limits, Tuning};
 use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::study::accuracy::tradeoff::{Options, plot, run as study};
 use crate::study::bench::{EngineName, Pace};
-use crate::study::plot::Format;
 use crate::study::rays::RayKind;
-use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Samples per pixel unless told otherwise.
 const SAMPLES: [u32; 3] = [1, 4, 16];
@@ -120,12 +118,7 @@ pub fn run(args: &Args) -> Result<()> {
         check_plot(file, args.json.file())?;
     }
     let model = Model::read(&args.model)?;
-    let mut progress = |line: &str| {
-        if std::io::stderr().is_terminal() {
-            eprintln!("{line} …");
-        }
-    };
-    let report = study(&model.name, &model.mesh, &options, &mut progress)?;
+    let report = study(&model.name, &model.mesh, &options, &mut watch)?;
     if let Some(file) = &args.plot {
         plot::write(file, &report)?;
     }
@@ -191,14 +184,6 @@ fn options(args: &Args) -> Result<Options> {
     };
     options.check().map_err(as_option)?;
     Ok(options)
-}
-
-fn check_plot(file: &Path, json: Option<&Path>) -> Result<()> {
-    Format::of(file)?;
-    if json.is_some_and(|json| same_file(file, json)) {
-        return Err(Error::option("--plot", "this is the report's file too; give another name"));
-    }
-    check_writable(file)
 }
 
 /// A time with its unit, in seconds.

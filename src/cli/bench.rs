@@ -95,11 +95,17 @@ pub fn watch(line: &str) {
     }
 }
 
-fn options(args: &Args) -> Result<Options> {
-    let most = if args.threads == 0 { hardware_threads() } else { args.threads };
-    if most > 4096 {
-        return Err(Error::option("--threads", format!("{most} is more than 4096")));
+/// As many as are asked for; 0 for all processors.
+pub fn threads(wanted: usize) -> Result<usize> {
+    let threads = if wanted == 0 { hardware_threads() } else { wanted };
+    if threads > 4096 {
+        return Err(Error::option("--threads", format!("{threads} is more than 4096")));
     }
+    Ok(threads)
+}
+
+fn options(args: &Args) -> Result<Options> {
+    let most = threads(args.threads)?;
     if args.rounds == 0 {
         return Err(Error::option("--rounds", "0 rounds measure nothing"));
     }

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::files::check_writable;
 use crate::render::image::{self, Format};
 use crate::render::{Aovs, Frame};
+use crate::study::plot;
 use std::path::{Path, PathBuf};
 
 /// The greatest change of exposure that makes sense.
@@ -112,6 +113,15 @@ fn first_path(picture: &Path) -> PathBuf {
 /// Whether two paths name one file, as far as can be known without creating it.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Finds out before any work whether a plot can be written, and is not the report's file.
+pub fn check_plot(file: &Path, json: Option<&Path>) -> Result<()> {
+    plot::Format::of(file)?;
+    if json.is_some_and(|json| same_file(file, json)) {
+        return Err(Error::option("--plot", "this is the report's file too; give another name"));
+    }
+    check_writable(file)
 }
 
 #[cfg(test)]

@@ -1,15 +1,13 @@
 //! `raypack scaling`: how the time of a ray grows with the model.
 
-use super::bench::watch;
+use super::bench::{threads, watch};
 use super::generate::count;
 use super::options::{AccuracyOption, BuildOptions};
-use super::outputs::same_file;
+use super::outputs::check_plot;
 use super::report::Json;
 use crate::error::{Error, Result};
-use crate::files::check_writable;
 use crate::simd::Isa;
-use crate::study::bench::{self, EngineName, Pace, hardware_threads};
-use crate::study::plot::Format;
+use crate::study::bench::{self, EngineName, Pace};
 use crate::study::rays::RayKind;
 use crate::study::scaling::{Options, plot, run as measure};
 use std::path::PathBuf;
@@ -74,11 +72,7 @@ pub fn run(args: &Args) -> Result<()> {
     let options = options(args)?;
     args.json.check()?;
     if let Some(path) = &args.plot {
-        Format::of(path)?;
-        if args.json.file().is_some_and(|json| same_file(path, json)) {
-            return Err(Error::option("--plot", "this is the report's file; give another name"));
-        }
-        check_writable(path)?;
+        check_plot(path, args.json.file())?;
     }
     let report = measure(&options, &mut watch)?;
     if let Some(path) = &args.plot {
@@ -88,10 +82,7 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 fn options(args: &Args) -> Result<Options> {
-    let threads = if args.threads == 0 { hardware_threads() } else { args.threads };
-    if threads > 4096 {
-        return Err(Error::option("--threads", format!("{threads} is more than 4096")));
-    }
+    let threads = threads(args.threads)?;
     if args.rounds == 0 {
         return Err(Error::option("--rounds", "0 rounds measure nothing"));
     }

@@ -81,34 +81,17 @@ impl Effect {
 }
 
 impl Effect {
-    /// Whether it casts rays of its own.
-    pub const fn casts_rays(self) -> bool {
-        matches!(
-            self,
-            Self::CutOuts
-                | Self::Transparency
-                | Self::Shadows
-                | Self::SoftShadows
-                | Self::Reflection
-                | Self::Glossy
-                | Self::Refraction
-                | Self::AmbientOcclusion
-                | Self::Interreflection
-                | Self::Environment
-        )
-    }
-
-    /// What is counted of it: rays, if it [casts](Self::casts_rays) some, or else what it does with each hit or sample.
-    pub const fn unit(self) -> &'static str {
+    /// What it does with each hit or sample; `None` if it casts rays of its own, which are counted then.
+    const fn uses(self) -> Option<&'static str> {
         match self {
-            Self::Textures | Self::Bump => "look-ups",
-            Self::SmoothNormals => "normals",
-            Self::Emission => "lights seen",
-            Self::Highlights => "highlights",
-            Self::Fresnel => "reflectances",
-            Self::Absorption => "ways inside",
-            Self::DepthOfField => "lens points",
-            Self::Antialiasing => "more samples",
+            Self::Textures | Self::Bump => Some("look-ups"),
+            Self::SmoothNormals => Some("normals"),
+            Self::Emission => Some("lights seen"),
+            Self::Highlights => Some("highlights"),
+            Self::Fresnel => Some("reflectances"),
+            Self::Absorption => Some("ways inside"),
+            Self::DepthOfField => Some("lens points"),
+            Self::Antialiasing => Some("more samples"),
             Self::CutOuts
             | Self::Transparency
             | Self::Shadows
@@ -118,7 +101,20 @@ impl Effect {
             | Self::Refraction
             | Self::AmbientOcclusion
             | Self::Interreflection
-            | Self::Environment => "rays",
+            | Self::Environment => None,
+        }
+    }
+
+    /// Whether it casts rays of its own.
+    pub const fn casts_rays(self) -> bool {
+        self.uses().is_none()
+    }
+
+    /// What is counted of it: rays, if it [casts](Self::casts_rays) some, or else what it does with each hit or sample.
+    pub const fn unit(self) -> &'static str {
+        match self.uses() {
+            Some(uses) => uses,
+            None => "rays",
         }
     }
 }
