@@ -6,6 +6,7 @@
 
 use super::avx2;
 use super::lanes::{Lanes, Mask, Simd};
+use super::sixteen::Sixteen;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -169,5 +170,35 @@ impl Lanes<16> for F32x16 {
         let mut values = [0; 16];
         avx512!(_mm512_storeu_si512(values.as_mut_ptr().cast(), ids));
         values
+    }
+}
+
+/// Four fours side by side.
+#[inline(always)]
+fn side_by_side(fours: [&[f32; 4]; 4]) -> __m512 {
+    let [a, b, c, d] = fours;
+    let row = avx512!(_mm512_castps128_ps512(_mm_loadu_ps(a.as_ptr())));
+    let row = avx512!(_mm512_insertf32x4::<1>(row, _mm_loadu_ps(b.as_ptr())));
+    let row = avx512!(_mm512_insertf32x4::<2>(row, _mm_loadu_ps(c.as_ptr())));
+    avx512!(_mm512_insertf32x4::<3>(row, _mm_loadu_ps(d.as_ptr())))
+}
+
+impl Sixteen for F32x16 {
+    #[inline(always)]
+    fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
+        // Row `i` holds the fours i, i + 4, i + 8 and i + 12, so that exchanging rows and columns in each
+        // quarter puts all lanes in order.
+        let a = side_by_side([fours[0], fours[4], fours[8], fours[12]]);
+        let b = side_by_side([fours[1], fours[5], fours[9], fours[13]]);
+        let c = side_by_side([fours[2], fours[6], fours[10], fours[14]]);
+        let d = side_by_side([fours[3], fours[7], fours[11], fours[15]]);
+        let (low_ab, high_ab) = (avx512!(_mm512_unpacklo_ps(a, b)), avx512!(_mm512_unpackhi_ps(a, b)));
+        let (low_cd, high_cd) = (avx512!(_mm512_unpacklo_ps(c, d)), avx512!(_mm512_unpackhi_ps(c, d)));
+        [
+            Self(avx512!(_mm512_shuffle_ps::<0x44>(low_ab, low_cd))),
+            Self(avx512!(_mm512_shuffle_ps::<0xee>(low_ab, low_cd))),
+            Self(avx512!(_mm512_shuffle_ps::<0x44>(high_ab, high_cd))),
+            Self(avx512!(_mm512_shuffle_ps::<0xee>(high_ab, high_cd))),
+        ]
     }
 }

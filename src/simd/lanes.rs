@@ -1,6 +1,7 @@
 //! What a vector of `W` floats can do.
 
 use super::eight::Eight;
+use super::sixteen::Sixteen;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 /// One bit a lane: the result of comparing [`Lanes`].
@@ -108,5 +109,5 @@ pub trait Simd {
     /// Eight floats.
     type F8: Eight;
     /// Sixteen floats.
-    type F16: Lanes<16>;
+    type F16: Sixteen;
 }

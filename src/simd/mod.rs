@@ -17,6 +17,7 @@ mod lanes;
 mod portable;
 mod prefetch;
 mod scalar;
+mod sixteen;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -29,6 +30,7 @@ pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};
 pub use prefetch::prefetch;
+pub use sixteen::Sixteen;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,8 @@
 //! Twice the lanes: two vectors that act as one, for instruction sets narrower than a packet.
 
+use super::eight::Eight;
 use super::lanes::{Lanes, Mask};
+use super::sixteen::Sixteen;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 /// Lanes `0..W/2` in the first, the others in the second.
@@ -143,4 +145,24 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
     fn ids_store(ids: Self::Ids) -> [i32; 16] {
         joined(L::ids_store(ids.0), L::ids_store(ids.1))
     }
+}
+
+impl<L: Eight> Sixteen for Pair<L> {
+    #[inline(always)]
+    fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
+        let [a, b, c, d] = half_of_fours::<L>(fours, 0);
+        let [e, f, g, h] = half_of_fours::<L>(fours, 8);
+        [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
+    }
+}
+
+/// [`Sixteen::of_fours`] of the eight from `first` on.
+#[inline(always)]
+fn half_of_fours<L: Eight>(fours: &[&[f32; 4]; 16], first: usize) -> [L; 4] {
+    L::transpose_fours([
+        L::of_fours([fours[first], fours[first + 4]]),
+        L::of_fours([fours[first + 1], fours[first + 5]]),
+        L::of_fours([fours[first + 2], fours[first + 6]]),
+        L::of_fours([fours[first + 3], fours[first + 7]]),
+    ])
 }

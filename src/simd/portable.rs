@@ -2,6 +2,7 @@
 
 use super::eight::Eight;
 use super::lanes::{Lanes, Mask, Simd};
+use super::sixteen::Sixteen;
 use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -136,6 +137,8 @@ macro_rules! portable_lanes {
 portable_lanes!(4, F32x4, Mask4, f32x4, i32x4);
 portable_lanes!(8, F32x8, Mask8, f32x8, i32x8);
 portable_lanes!(16, F32x16, Mask16, f32x16, i32x16);
+
+impl Sixteen for F32x16 {}
 
 impl Eight for F32x8 {
     #[inline(always)]

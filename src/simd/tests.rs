@@ -113,6 +113,22 @@ fn check_eight<L: Eight>() {
     }
 }
 
+/// Sixteen records of four numbers, wherever they lie, come out number by number.
+#[inline(always)]
+fn check_sixteen<L: Sixteen>() {
+    let fours: [[f32; 4]; 16] = std::array::from_fn(|j| [0.0, 100.0, 200.0, 300.0].map(|x| x + j as f32));
+    let mut scattered = [&fours[0]; 16];
+    for j in 0..16 {
+        scattered[j] = &fours[(j * 5) & 15];
+    }
+    for (i, column) in L::of_fours(&scattered).into_iter().enumerate() {
+        let column = column.store();
+        for j in 0..16 {
+            assert_eq!(column[j], fours[(j * 5) & 15][i], "number {i} of record {j}");
+        }
+    }
+}
+
 struct CheckAll;
 
 impl Task for CheckAll {
@@ -124,6 +140,7 @@ impl Task for CheckAll {
         check::<8, S::F8>();
         check::<16, S::F16>();
         check_eight::<S::F8>();
+        check_sixteen::<S::F16>();
     }
 }
 

@@ -89,8 +89,8 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
             let record = tree.record_of(id as u32);
             let weights = match test {
                 Some(test) => {
-                    let candidate = test.test(record, lanes);
-                    M::Test::<W, L>::weights(record, candidate.u, candidate.v)
+                    let [u, v] = test.weigh(record, lanes);
+                    M::Test::<W, L>::weights(record, u, v)
                 }
                 None => M::Test::<W, L>::weights(record, self.u, self.v),
             };

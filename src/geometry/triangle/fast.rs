@@ -84,7 +84,6 @@ pub struct Lines<const W: usize, L: Lanes<W>> {
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     type Record = Projected;
-    type Placed = ();
     type Kept = ();
 
     #[inline(always)]

@@ -11,11 +11,13 @@
 mod accuracy;
 pub mod exact;
 pub mod fast;
+mod placed;
 mod record;
 mod test;
 pub mod watertight;
 
 pub use accuracy::Accuracy;
+pub use placed::{Placed, Row};
 pub use record::Triangle;
 pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Test, Watertight};
 

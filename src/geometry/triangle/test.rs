@@ -1,6 +1,6 @@
 //! What every ray-triangle test is to a traversal kernel.
 
-use super::{Accuracy, Triangle};
+use super::{Accuracy, Placed, Triangle};
 use crate::simd::{Eight, Lanes};
 
 /// Three coordinates, `W` lanes each.
@@ -13,8 +13,6 @@ pub type Lanes3<L> = [L; 3];
 pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What is kept of each triangle for this test.
     type Record;
-    /// What rays that start at one point can share of a triangle.
-    type Placed: Copy + Default;
     /// What is kept of rays that start at one point and whose directions are greatest along one axis, to
     /// be prepared again in no time.
     type Kept: Copy + Default;
@@ -25,8 +23,7 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What to keep of rays whose directions are greatest along `axis`.
     fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept;
 
-    /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept. Only for
-    /// [`test_placed`](Self::test_placed) and [`test`](Self::test).
+    /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept.
     fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self;
 
     /// One triangle against the lanes in `lanes`; what the others answer means nothing.
@@ -37,36 +34,29 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// gap that so opens between its neighbours.
     fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
 
-    /// A triangle prepared for rays that all start at `apex` and run fastest along `axis`: up, if `sign`
-    /// is 1, or down, if it is -1.
-    ///
-    /// `edges` tells the sides on which a ray passes the triangle's edges: with `x` and `y` its slopes
-    /// along the next two axes relative to its speed along this one, `edge[0] x + edge[1] y + edge[2]` is
-    /// off by less than `edge[3]`, any mode's own errors included.
-    #[inline(always)]
-    fn place(
-        _triangle: &Self::Record,
-        _apex: &[f32; 3],
-        _axis: usize,
-        _sign: f32,
-        _edges: &[[f32; 4]; 3],
-    ) -> Self::Placed {
-        Self::Placed::default()
-    }
-
     /// Whether `test_placed` gives no weights, for [`test`](Self::test) to be asked for them in the end.
     const DEFERS: bool = false;
 
-    /// What [`test`](Self::test) answers, to the bit, if all lanes that matter start at the apex that
-    /// `placed` was prepared for. (Other lanes' answers mean nothing.)
+    /// What [`test`](Self::test) answers of the triangle `which` of those in `placed`, to the bit, if that can be
+    /// told from what was kept of rays from the apex that they were prepared for, and from the rays' directions,
+    /// renamed likewise. `None` if not. (What is
+    /// said of lanes that are not in `lanes` means nothing.)
     #[inline(always)]
     fn test_placed(
-        &self,
-        triangle: &Self::Record,
-        _placed: &Self::Placed,
-        lanes: L::Mask,
-    ) -> Candidate<W, L> {
-        self.test(triangle, lanes)
+        _kept: &Self::Kept,
+        _direction: &Lanes3<L>,
+        _placed: &Placed,
+        _which: usize,
+        _lanes: L::Mask,
+    ) -> Option<Candidate<W, L>> {
+        None
+    }
+
+    /// The weights that [`test`](Self::test) gives for the lanes in `lanes`, all of which hit the triangle.
+    #[inline(always)]
+    fn weigh(&self, triangle: &Self::Record, lanes: L::Mask) -> [L; 2] {
+        let candidate = self.test(triangle, lanes);
+        [candidate.u, candidate.v]
     }
 
     /// The barycentric weights `(u, v)` of the triangle's second and third corner, from those that

@@ -40,7 +40,7 @@
 //! behind the wall, the far one entered before it, and an apex inside the wall is in both.
 
 use crate::geometry::Aabb;
-use crate::simd::Lanes;
+use crate::simd::Sixteen;
 use crate::traverse::walk::{Interval, MARGIN};
 
 /// Packets in a beam.
@@ -132,7 +132,7 @@ pub struct Crossing<L> {
     pub enter: L,
 }
 
-impl<L: Lanes<16>, const PARALLEL: bool> Beam<L, PARALLEL> {
+impl<L: Sixteen, const PARALLEL: bool> Beam<L, PARALLEL> {
     /// A beam in a scene, and the depths at which its packets are inside of the scene's bounds.
     #[inline(always)]
     pub fn new(frame: Frame, extent: &Extent<L>, spread: Spread, bounds: &Aabb) -> (Self, Interval<L>) {
@@ -235,7 +235,7 @@ impl<L: Lanes<16>, const PARALLEL: bool> Beam<L, PARALLEL> {
 
 /// The rates up and down of lanes with slopes from `low` to `high`.
 #[inline(always)]
-fn rates_of<L: Lanes<16>>(low: L, high: L) -> [Rate<L>; 2] {
+fn rates_of<L: Sixteen>(low: L, high: L) -> [Rate<L>; 2] {
     let (zero, infinite) = (L::splat(0.0), L::splat(f32::INFINITY));
     let (at_low, at_high) = (L::splat(1.0) / low, L::splat(1.0) / high);
     let (all_up, some_up) = (zero.lt(low), zero.lt(high));

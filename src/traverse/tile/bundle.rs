@@ -1,25 +1,26 @@
 //! What the walk of a beam asks of the rays in it; and rays cut into what registers hold.
 
 use super::outline::Block;
-use crate::simd::Lanes;
+use crate::simd::{Lanes, Sixteen};
 
 /// A beam's rays, and what they have found.
-pub trait Bundle<L: Lanes<16>> {
+pub trait Bundle<L: Sixteen> {
     /// The work after which a tile is given up, in steps of about one upper node: some times what a tile
     /// takes whose rays are worth tracing together. Rays that are not, because each packet's go all over
     /// the place, or because there are many triangles between one ray and the next, would meet every
     /// triangle in a packet's window.
     const PATIENCE: u32;
 
+    /// Packets with a wider window go on alone from the start: a square of a picture may lie across an edge, so that
+    /// a light sees it as two places far apart.
+    const WIDEST: f32;
+
     /// The depth beyond which no ray of each packet looks for anything any more.
     fn reach(&self) -> L;
 
-    /// Prepares a triangle of a block for being tested: the one in `lane`, whose id is `primitive`.
-    fn place(&mut self, lane: usize, primitive: u32, block: &Block);
-
     /// Tests a packet against the triangles whose bits are set in `chosen`, of a block with the ids
-    /// `primitives`, all of which have been placed.
-    fn test(&mut self, packet: usize, primitives: &[u32], chosen: u32);
+    /// `primitives`.
+    fn test(&mut self, packet: usize, block: &Block, primitives: &[u32], chosen: u32);
 
     /// A packet walks on by itself, through the full tree below a place of the upper one, from the depth
     /// `tmin` to `tmax`.

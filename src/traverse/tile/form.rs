@@ -1,7 +1,7 @@
 //! Whether rays are a beam, and which: what each ray and each packet look like from the apex.
 
 use super::beam::{Extent, Frame, NARROW, PACKETS, Spread, WIDEN};
-use crate::simd::{Lanes, Mask};
+use crate::simd::{Mask, Sixteen};
 use crate::traverse::lanes::RayPacket;
 use crate::traverse::range::{LEAST, LIMIT};
 use crate::traverse::walk::Interval;
@@ -105,7 +105,7 @@ fn meeting(rays: &[RayPacket<16>], active: &[u32; PACKETS], first: usize) -> Opt
 /// The packets' extents if the rays are a beam from its apex. `None` if they are none: if origins differ,
 /// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin.
 #[inline(always)]
-pub fn from_apex<L: Lanes<16>>(
+pub fn from_apex<L: Sixteen>(
     frame: &Frame,
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
@@ -139,7 +139,7 @@ pub fn from_apex<L: Lanes<16>>(
 /// The packets' extents, what each ray looks like, and how far rays are off, if they are a beam of some
 /// form. `None` if they are none.
 #[inline(always)]
-pub fn of_form<L: Lanes<16>>(
+pub fn of_form<L: Sixteen>(
     form: Form,
     frame: &Frame,
     rays: &[RayPacket<16>],
@@ -216,7 +216,7 @@ pub fn of_form<L: Lanes<16>>(
 /// is within what kernels compute with, and their interval begins at the origin or beyond. A NaN
 /// anywhere fails.
 #[inline(always)]
-fn ordinary<L: Lanes<16>>(forward: L, tnear: L, tfar: L) -> L::Mask {
+fn ordinary<L: Sixteen>(forward: L, tnear: L, tfar: L) -> L::Mask {
     L::splat(LEAST).le(forward)
         & forward.lt(L::splat(LIMIT))
         & L::splat(0.0).le(tnear)
@@ -241,7 +241,7 @@ impl Extents {
     }
 
     #[inline(always)]
-    fn set<L: Lanes<16>>(&mut self, packet: usize, lanes: u32, places: [L; 2], near: L, far: L) {
+    fn set<L: Sixteen>(&mut self, packet: usize, lanes: u32, places: [L; 2], near: L, far: L) {
         let (counts, most) = (L::mask_from_bits(lanes), L::splat(f32::INFINITY));
         let least = L::splat(f32::NEG_INFINITY);
         for side in 0..2 {
@@ -254,7 +254,7 @@ impl Extents {
 
     /// The extents of rays whose origins are up to `range` away from the apex.
     #[inline(always)]
-    fn finish<L: Lanes<16>>(&self, range: f32) -> Extent<L> {
+    fn finish<L: Sixteen>(&self, range: f32) -> Extent<L> {
         let (nearest, farthest) = (L::load(&self.nearest), L::load(&self.farthest));
         // Outward by more than the roundings of depths, which are sums, and may have either sign.
         let more = L::splat(range * (WIDEN - 1.0));

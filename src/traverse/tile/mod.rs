@@ -33,7 +33,7 @@ pub use probe::{Probe, TileCounts};
 use super::lanes::{HitPacket, RayPacket};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Simd};
+use crate::simd::{Lanes, Simd, Sixteen};
 use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
 use form::{Form, Seen};
@@ -55,9 +55,9 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     probe: &mut P,
 ) -> bool {
     if S::NATIVE == 16 {
-        nearest::<S::F16, S::F16, T, M, P, 16>(tree, rays, active, hits, probe)
+        nearest::<S::F16, S::F16, T, M, P, 16, 1>(tree, rays, active, hits, probe)
     } else {
-        nearest::<S::F16, S::F8, T, M, P, 8>(tree, rays, active, hits, probe)
+        nearest::<S::F16, S::F8, T, M, P, 8, 2>(tree, rays, active, hits, probe)
     }
 }
 
@@ -78,9 +78,9 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     }
 }
 
-/// [`intersect`] with `N` rays to a register.
+/// [`intersect`] with `N` rays to a register, and so packets in `PARTS` parts.
 #[inline(always)]
-fn nearest<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
+fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize, const PARTS: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
@@ -93,7 +93,7 @@ fn nearest<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N:
     let Some((Form::From, frame)) = form::guess(rays, active) else { return false };
     let Some(extent) = form::from_apex::<L>(&frame, rays, active) else { return false };
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
-    let mut bundle = Nearest::<L, R, T, M, N>::new(tree, rays, active, &beam);
+    let mut bundle = Nearest::<L, R, T, M, N, PARTS>::new(tree, rays, active, &beam);
     Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
     for (packet, hits) in hits.iter_mut().enumerate() {
         bundle.give(packet, hits);
@@ -103,7 +103,7 @@ fn nearest<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N:
 
 /// [`occluded`] with `N` rays to a register.
 #[inline(always)]
-fn shadows<L: Lanes<16>, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
+fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[u32; PACKETS],
@@ -140,7 +140,7 @@ struct Trace<'a, L, T> {
     spread: Spread,
 }
 
-impl<L: Lanes<16>, T: Tree> Trace<'_, L, T> {
+impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
     /// The lanes that find nothing.
     #[inline(always)]
     fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(

@@ -5,30 +5,23 @@ use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3};
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
-use crate::simd::Lanes;
-use crate::simd::Mask;
+use crate::simd::{Lanes, Mask, Sixteen};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::{HitPacket, RayPacket};
 use crate::traverse::packet::descend;
 use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk};
 
-/// Most parts that sixteen packets are traced in: halves, where registers hold eight lanes.
-const PARTS: usize = 2 * PACKETS;
-
 /// What the tests of `N` rays keep for a beam.
 type Kept<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Kept;
-
-/// A triangle as the tests see it from a beam's apex.
-type Placed<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Placed;
 
 /// Up to sixteen packets.
 ///
 /// Packets stand in the lanes of `L`, as the beam has them. Rays stand in the lanes of `R`, as many as a
-/// register holds: part `i` of packet `p` is at `p * (16 / N) + i`.
-pub struct Nearest<'a, L, R, T, M, const N: usize>
+/// register holds, in `P` parts.
+pub struct Nearest<'a, L, R, T, M, const N: usize, const P: usize>
 where
-    L: Lanes<16>,
+    L: Sixteen,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -38,17 +31,15 @@ where
     /// Which lanes of each packet count.
     active: &'a [u32; PACKETS],
     beam: &'a Beam<L, false>,
-    kept: [Kept<M, R, N>; PARTS],
-    closest: [Closest<N, R>; PARTS],
+    kept: [[Kept<M, R, N>; P]; PACKETS],
+    closest: [[Closest<N, R>; P]; PACKETS],
     /// The depth beyond which no ray of a packet looks for anything any more.
     reach: [f32; PACKETS],
-    /// The block's triangles that are left.
-    placed: [Placed<M, R, N>; 16],
 }
 
-impl<'a, L, R, T, M, const N: usize> Nearest<'a, L, R, T, M, N>
+impl<'a, L, R, T, M, const N: usize, const P: usize> Nearest<'a, L, R, T, M, N, P>
 where
-    L: Lanes<16>,
+    L: Sixteen,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -66,24 +57,22 @@ where
             rays,
             active,
             beam,
-            kept: [Default::default(); PARTS],
-            closest: [Closest::new(R::splat(f32::NEG_INFINITY)); PARTS],
+            kept: [[Default::default(); P]; PACKETS],
+            closest: [[Closest::new(R::splat(f32::NEG_INFINITY)); P]; PACKETS],
             reach: [f32::INFINITY; PACKETS],
-            placed: [Default::default(); 16],
         };
         for packet in 0..rays.len().min(PACKETS) {
-            for part in 0..16 / N {
+            for part in 0..P {
                 let rays = &rays[packet];
-                let place = packet * (16 / N) + part;
                 let direction = load_part3::<N, R>(&rays.direction, part);
-                bundle.kept[place] = M::Test::<N, R>::keep(&direction, beam.frame.axes[2]);
+                bundle.kept[packet][part] = M::Test::<N, R>::keep(&direction, beam.frame.axes[2]);
                 // Lanes that do not count have found what they look for.
                 let tfar = R::select(
                     bundle.counts(packet, part),
                     load_part::<N, R>(&rays.tfar, part),
                     R::splat(f32::NEG_INFINITY),
                 );
-                bundle.closest[place] = Closest::new(tfar);
+                bundle.closest[packet][part] = Closest::new(tfar);
             }
         }
         bundle
@@ -99,17 +88,17 @@ where
     #[inline(always)]
     fn part_test(&self, packet: usize, part: usize) -> M::Test<N, R> {
         let direction = load_part3::<N, R>(&self.rays[packet].direction, part);
-        let kept = &self.kept[packet * (16 / N) + part];
+        let kept = &self.kept[packet][part];
         M::Test::<N, R>::revive(kept, &self.beam.frame.apex, &direction, self.beam.frame.axes[2])
     }
 
     /// Writes a packet's hits.
     #[inline(always)]
     pub fn give(&self, packet: usize, hits: &mut HitPacket<16>) {
-        for part in 0..16 / N {
+        for part in 0..P {
             let test = self.part_test(packet, part);
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
-            let found = self.closest[packet * (16 / N) + part].records::<T, M>(self.tree, again);
+            let found = self.closest[packet][part].records::<T, M>(self.tree, again);
             hits.set_part(part, &found);
         }
     }
@@ -118,25 +107,27 @@ where
     #[inline(always)]
     fn shorten(&mut self, packet: usize) {
         let mut reach = f32::NEG_INFINITY;
-        for part in 0..16 / N {
+        for part in 0..P {
             let speed = load_part::<N, R>(&self.rays[packet].direction[self.beam.frame.axes[2]], part).abs();
-            let depth = (self.closest[packet * (16 / N) + part].t * speed).greatest();
+            let depth = (self.closest[packet][part].t * speed).greatest();
             reach = if depth > reach { depth } else { reach };
         }
         self.reach[packet] = reach + reach.abs() * ROUNDINGS;
     }
 }
 
-impl<L, R, T, M, const N: usize> Bundle<L> for Nearest<'_, L, R, T, M, N>
+impl<L, R, T, M, const N: usize, const P: usize> Bundle<L> for Nearest<'_, L, R, T, M, N, P>
 where
-    L: Lanes<16>,
+    L: Sixteen,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
 {
-    // Half of this lost up to 7 % in interiors, and twice as much gained 3 % there and lost 10 % among small
-    // triangles.
-    const PATIENCE: u32 = 5120;
+    // 5120 lost up to a tenth; 12288 was as good as this (sponza, armadillo, kitchen, power plant; AVX-512).
+    const PATIENCE: u32 = 8192;
+
+    // Squares of a picture are all as wide.
+    const WIDEST: f32 = f32::INFINITY;
 
     #[inline(always)]
     fn reach(&self) -> L {
@@ -144,35 +135,32 @@ where
     }
 
     #[inline(always)]
-    fn place(&mut self, lane: usize, primitive: u32, block: &Block) {
-        let frame = &self.beam.frame;
-        let record = self.tree.record_of(primitive);
-        self.placed[lane & 15] =
-            M::Test::<N, R>::place(record, &frame.apex, frame.axes[2], frame.sign, &block.edges_of(lane));
-    }
-
-    #[inline(always)]
-    fn test(&mut self, packet: usize, primitives: &[u32], chosen: u32) {
+    fn test(&mut self, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
         let packet = packet & 15;
         let mut changed = false;
-        for part in 0..16 / N {
-            let test = self.part_test(packet, part);
-            let place = packet * (16 / N) + part;
-            let mut closest = self.closest[place];
-            let tnear = load_part::<N, R>(&self.rays[packet].tnear, part);
+        let [i, j, k] = self.beam.frame.axes;
+        let rays = &self.rays[packet];
+        for part in 0..P {
+            let direction = [
+                load_part::<N, R>(&rays.direction[i], part),
+                load_part::<N, R>(&rays.direction[j], part),
+                load_part::<N, R>(&rays.direction[k], part),
+            ];
+            let tnear = load_part::<N, R>(&rays.tnear, part);
             let live = self.counts(packet, part);
-            let mut part_changed = false;
             for triangle in bits(chosen) {
-                let primitive = primitives[triangle];
-                let placed = &self.placed[triangle & 15];
-                let candidate = test.test_placed(self.tree.record_of(primitive), placed, live);
-                part_changed |=
+                let (primitive, kept) = (primitives[triangle], &self.kept[packet][part]);
+                // No `unwrap_or_else`: its closure might stay out of line, and be compiled without the
+                // instruction set.
+                let told = M::Test::<N, R>::test_placed(kept, &direction, &block.placed, triangle, live);
+                let candidate = match told {
+                    Some(candidate) => candidate,
+                    None => self.part_test(packet, part).test(self.tree.record_of(primitive), live),
+                };
+                let closest = &mut self.closest[packet][part];
+                changed |=
                     closest.take::<false>(&candidate, primitive, tnear, live, !M::Test::<N, R>::DEFERS);
             }
-            if part_changed {
-                self.closest[place] = closest;
-            }
-            changed |= part_changed;
         }
         if changed {
             self.shorten(packet);
@@ -182,12 +170,12 @@ where
     #[inline(always)]
     fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
         let mut changed = false;
-        for part in 0..16 / N {
+        for part in 0..P {
             let rays = self.rays[packet].part::<N>(part);
             let active = self.active[packet] >> (part * N) & ((1 << N) - 1);
             let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
             let speed = R::load(&rays.direction[self.beam.frame.axes[2]]).abs();
-            let mut closest = self.closest[packet * (16 / N) + part];
+            let mut closest = self.closest[packet][part];
             let interval = Interval {
                 tmin: (R::splat(tmin - tmin.abs() * ROUNDINGS) / speed).max(inside.tmin),
                 tmax: (R::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(closest.t),
@@ -197,7 +185,7 @@ where
                 let tnear = R::load(&rays.tnear);
                 let node = self.tree.beneath(place);
                 descend::<N, R, T, M, false>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
-                self.closest[packet * (16 / N) + part] = closest;
+                self.closest[packet][part] = closest;
                 changed = true;
             }
         }

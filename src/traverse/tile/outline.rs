@@ -27,8 +27,8 @@
 //! about a hit.
 
 use super::beam::{Beam, Frame, Spread};
-use crate::geometry::triangle::Triangle;
-use crate::simd::Lanes;
+use crate::geometry::triangle::{Placed, Row, Triangle};
+use crate::simd::{Lanes, Sixteen};
 
 /// By how much outlines are widened, relative to the farthest corner.
 const SLACK: f32 = 128.0 / (1 << 24) as f32;
@@ -64,7 +64,7 @@ pub struct Window<L> {
     pub farthest: L,
 }
 
-impl<L: Lanes<16>> Window<L> {
+impl<L: Sixteen> Window<L> {
     /// The window of places from `low` to `high`, which are off by less than `blur`.
     #[inline(always)]
     pub fn new(low: [L; 2], high: [L; 2], nearest: L, farthest: L, blur: f32) -> Self {
@@ -73,6 +73,42 @@ impl<L: Lanes<16>> Window<L> {
         let more = L::splat(blur);
         let half = [(high[0] - low[0]) * half + more, (high[1] - low[1]) * half + more];
         Self { low, high, center, half, nearest, farthest }
+    }
+
+    /// The same in memory, for the packets to be taken one by one.
+    #[inline(always)]
+    pub fn rows(&self) -> Rows {
+        let Self { low, high, center, half, nearest, farthest } = self;
+        let [low, high] = [[low[0].store(), low[1].store()], [high[0].store(), high[1].store()]];
+        let [center, half] = [[center[0].store(), center[1].store()], [half[0].store(), half[1].store()]];
+        Rows { low, high, center, half, nearest: nearest.store(), farthest: farthest.store() }
+    }
+}
+
+/// A [`Window`] in memory.
+#[repr(C, align(64))]
+pub struct Rows {
+    low: [Row; 2],
+    high: [Row; 2],
+    center: [Row; 2],
+    half: [Row; 2],
+    nearest: Row,
+    farthest: Row,
+}
+
+impl Rows {
+    /// What one packet sees, in every lane.
+    #[inline(always)]
+    pub fn one<L: Sixteen>(&self, packet: usize) -> Window<L> {
+        let packet = packet & 15;
+        Window {
+            low: [L::splat(self.low[0][packet]), L::splat(self.low[1][packet])],
+            high: [L::splat(self.high[0][packet]), L::splat(self.high[1][packet])],
+            center: [L::splat(self.center[0][packet]), L::splat(self.center[1][packet])],
+            half: [L::splat(self.half[0][packet]), L::splat(self.half[1][packet])],
+            nearest: L::splat(self.nearest[packet]),
+            farthest: L::splat(self.farthest[packet]),
+        }
     }
 }
 
@@ -91,7 +127,7 @@ pub struct Outline<L, const PARALLEL: bool> {
     far: L,
 }
 
-impl<L: Lanes<16>, const PARALLEL: bool> Outline<L, PARALLEL> {
+impl<L: Sixteen, const PARALLEL: bool> Outline<L, PARALLEL> {
     /// The pairs of triangle and window in which a ray may hit.
     #[inline(always)]
     pub fn meets(&self, window: &Window<L>) -> L::Mask {
@@ -129,9 +165,6 @@ impl<L: Lanes<16>, const PARALLEL: bool> Outline<L, PARALLEL> {
     }
 }
 
-/// Rows of sixteen numbers, as vectors take them.
-type Row = [f32; 16];
-
 /// Up to sixteen triangles, coordinate by coordinate.
 #[derive(Clone)]
 #[repr(C, align(64))]
@@ -147,6 +180,8 @@ pub struct Block {
     high: [Row; 2],
     near: Row,
     far: Row,
+    /// What the tests of rays from an apex want.
+    pub placed: Placed,
 }
 
 impl Block {
@@ -162,30 +197,38 @@ impl Block {
             high: [ROW; 2],
             near: ROW,
             far: ROW,
+            placed: Placed::at_apex(),
         }
     }
 
-    /// Puts triangles into the first lanes, four at a time, so that rows are written four numbers at a
-    /// time; what lanes beyond the last hold means nothing. `triangle` gives the one with an id.
+    /// Puts triangles into the first lanes; the lanes beyond the last repeat the first one. `triangle` gives the
+    /// one with an id.
     #[inline(always)]
-    pub fn fill<'t>(&mut self, primitives: &[u32], triangle: impl Fn(u32) -> &'t Triangle) {
-        for (quad, ids) in primitives.chunks(4).enumerate().take(4) {
-            // The last lanes of the last quad repeat its first.
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| triangle(*ids.get(i).unwrap_or(&ids[0])));
-            for i in 0..3 {
-                for j in 0..3 {
-                    let numbers = [a.corners[i][j], b.corners[i][j], c.corners[i][j], d.corners[i][j]];
-                    self.corners[i][j].as_chunks_mut::<4>().0[quad & 3] = numbers;
-                }
-                let numbers = [a.plane[i], b.plane[i], c.plane[i], d.plane[i]];
-                self.normal[i].as_chunks_mut::<4>().0[quad & 3] = numbers;
+    pub fn fill<'t, L: Sixteen>(&mut self, primitives: &[u32], triangle: impl Fn(u32) -> &'t Triangle) {
+        let mut triangles = [triangle(primitives[0]); 16];
+        for (lane, id) in primitives.iter().enumerate().take(16) {
+            triangles[lane] = triangle(*id);
+        }
+        for four in 0..3 {
+            let mut fours = [&[0.0; 4]; 16];
+            for lane in 0..16 {
+                fours[lane] = &triangles[lane].fours()[four];
+            }
+            let columns = L::of_fours(&fours);
+            for (i, column) in columns.into_iter().enumerate() {
+                let place = 4 * four + i;
+                let row = match place / 3 {
+                    3 => &mut self.normal[place % 3],
+                    corner => &mut self.corners[corner][place % 3],
+                };
+                *row = column.store();
             }
         }
     }
 
-    /// Works out all lanes' outlines, which it keeps, and gives them.
+    /// Works out all lanes' outlines.
     #[inline(always)]
-    pub fn outline<L: Lanes<16>, const PARALLEL: bool>(
+    pub fn outline<L: Sixteen, const PARALLEL: bool>(
         &mut self,
         beam: &Beam<L, PARALLEL>,
     ) -> Outline<L, PARALLEL> {
@@ -213,7 +256,9 @@ impl Block {
             L::load(&self.normal[axes[1]]),
             L::load(&self.normal[axes[2]]) * L::splat(*sign),
         ];
-        let plane = plane::<L, PARALLEL>(&normal, &points[0], &along, slack);
+        let height = normal[0] * points[0][0] + normal[1] * points[0][1] + normal[2] * points[0][2];
+        self.placed.height = height.store();
+        let plane = plane::<L, PARALLEL>(&normal, height, &along, slack);
 
         // Each edge with the apex spans a plane. From p x (q - p) instead of p x q: an edge is known to
         // a rounding of its own length, not of its distance.
@@ -263,13 +308,24 @@ impl Block {
             }
         }
 
-        let outline = Outline { edges, plane, low, high, near: near - slack, far: back + slack };
-        self.keep(&outline);
-        outline
+        self.placed.depths = [(near * L::splat(*sign)).store(), (back * L::splat(*sign)).store()];
+        Outline { edges, plane, low, high, near: near - slack, far: back + slack }
     }
 
+    /// Keeps the outlines for [`one`](Self::one), and what the tests want.
     #[inline(always)]
-    fn keep<L: Lanes<16>, const PARALLEL: bool>(&mut self, outline: &Outline<L, PARALLEL>) {
+    pub fn keep<L: Sixteen, const PARALLEL: bool>(&mut self, outline: &Outline<L, PARALLEL>, frame: &Frame) {
+        let (zero, sign) = (L::splat(0.0), L::splat(frame.sign));
+        let mut flat = L::mask_from_bits(0xffff);
+        for i in 0..3 {
+            self.placed.normal[i] = self.normal[frame.axes[i]];
+            flat = flat & L::load(&self.placed.normal[i]).eq(zero);
+            // A slope in the frame is the ray's times the sign.
+            let [x, y, z, _] = outline.edges[i];
+            self.placed.edges[i] = [(x * sign).store(), (y * sign).store(), z.store()];
+        }
+        let slack = outline.edges[0][3].max(outline.edges[1][3]).max(outline.edges[2][3]);
+        self.placed.slack = L::select(flat, L::splat(f32::INFINITY), slack).store();
         for i in 0..3 {
             for j in 0..4 {
                 self.edges[i][j] = outline.edges[i][j].store();
@@ -286,17 +342,19 @@ impl Block {
         self.far = outline.far.store();
     }
 
-    /// The edges of one lane's triangle: coefficients over the slopes, and slacks.
+    /// What an edge of one lane's triangle is for rays at places `a` and `b`.
     #[inline(always)]
-    pub fn edges_of(&self, lane: usize) -> [[f32; 4]; 3] {
+    pub fn side<const W: usize, R: Lanes<W>>(&self, lane: usize, edge: usize, a: R, b: R) -> R {
         let lane = lane & 15;
-        let mut edges = [[0.0; 4]; 3];
-        for i in 0..3 {
-            for j in 0..4 {
-                edges[i][j] = self.edges[i][j][lane];
-            }
-        }
-        edges
+        let [x, y, z, _] = &self.edges[edge];
+        R::splat(x[lane]).mul_add(a, R::splat(y[lane]).mul_add(b, R::splat(z[lane])))
+    }
+
+    /// What that may be off by, at most, whichever the edge.
+    #[inline(always)]
+    pub fn slack_of(&self, lane: usize) -> f32 {
+        let lane = lane & 15;
+        self.edges[0][3][lane].max(self.edges[1][3][lane]).max(self.edges[2][3][lane])
     }
 
     /// The plane of one lane's triangle.
@@ -308,7 +366,7 @@ impl Block {
 
     /// The outline of one lane's triangle, in every lane.
     #[inline(always)]
-    pub fn one<L: Lanes<16>, const PARALLEL: bool>(&self, lane: usize) -> Outline<L, PARALLEL> {
+    pub fn one<L: Sixteen, const PARALLEL: bool>(&self, lane: usize) -> Outline<L, PARALLEL> {
         let lane = lane & 15;
         let zero = L::splat(0.0);
         let mut edges = [[zero; 4]; 3];
@@ -332,11 +390,10 @@ impl Block {
     }
 }
 
-/// What an outline keeps of planes through `point`.
+/// What an outline keeps of planes at a distance from the apex.
 #[inline(always)]
-fn plane<L: Lanes<16>, const PARALLEL: bool>(n: &[L; 3], point: &[L; 3], along: &[L; 2], slack: L) -> [L; 5] {
+fn plane<L: Sixteen, const PARALLEL: bool>(n: &[L; 3], distance: L, along: &[L; 2], slack: L) -> [L; 5] {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let distance = n[0] * point[0] + n[1] * point[1] + n[2] * point[2];
     if PARALLEL {
         let speed = n[0] * along[0] + n[1] * along[1] + n[2];
         let turned = one.copysign(speed);

@@ -8,7 +8,7 @@ use super::outline::{Block, Window};
 use super::probe::Probe;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Mask, prefetch};
+use crate::simd::{Mask, Sixteen, prefetch};
 use crate::traverse::stack::Stack;
 use crate::traverse::walk::Interval;
 
@@ -36,7 +36,7 @@ pub struct Descent<'a, L, T, const PARALLEL: bool> {
     work: u32,
 }
 
-impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> {
+impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> {
     #[inline(always)]
     pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>) -> Self {
         let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
@@ -51,6 +51,19 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
         let mut live = interval.live().bits();
         if live == 0 {
             return;
+        }
+
+        // Packets whose rays are not alike go on alone at once: with them, all would see too much.
+        let width = (beam.high[0] - beam.low[0]).max(beam.high[1] - beam.low[1]);
+        let narrow = width.le(L::splat(B::WIDEST));
+        let loose = live & !narrow.bits();
+        if loose != 0 {
+            go_alone(bundle, &interval, loose, 0, probe);
+            live &= !loose;
+            if live == 0 {
+                return;
+            }
+            interval.tmin = L::select(narrow, interval.tmin, L::splat(f32::INFINITY));
         }
         let start = interval;
         let mut place = 0;
@@ -146,7 +159,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
 
             // Cull for the beam.
             let tree = self.tree;
-            self.block.fill(primitives, |primitive| tree.triangle(primitive));
+            self.block.fill::<L>(primitives, |primitive| tree.triangle(primitive));
             let outline = self.block.outline(self.beam);
             let present = (1 << primitives.len()) - 1;
             let left = outline.meets(&all).bits() & present;
@@ -154,9 +167,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
             if left == 0 {
                 continue;
             }
-            for triangle in bits(left) {
-                bundle.place(triangle, primitives[triangle], &self.block);
-            }
+            self.block.keep(&outline, &self.beam.frame);
 
             // Cull for packets, the rarer of packets and triangles one by one.
             self.work += left.count_ones().min(live.count_ones()) * CULL_WORK;
@@ -169,8 +180,9 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
                     }
                 }
             } else {
+                let rows = window.rows();
                 for packet in bits(live) {
-                    chosen[packet & 15] = outline.meets(&one(&window, packet)).bits() & left;
+                    chosen[packet & 15] = outline.meets(&rows.one(packet)).bits() & left;
                 }
             }
 
@@ -180,7 +192,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
                 if chosen != 0 {
                     self.work += chosen.count_ones() * TEST_WORK;
                     probe.tests(chosen.count_ones());
-                    bundle.test(packet, primitives, chosen);
+                    bundle.test(packet, &self.block, primitives, chosen);
                 }
             }
             window.farthest = bundle.reach().min(window.farthest);
@@ -190,7 +202,7 @@ impl<'a, L: Lanes<16>, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL
 
 /// Packets go on alone below a place of the upper tree.
 #[inline(always)]
-fn go_alone<L: Lanes<16>, B: Bundle<L>, P: Probe>(
+fn go_alone<L: Sixteen, B: Bundle<L>, P: Probe>(
     bundle: &mut B,
     interval: &Interval<L>,
     packets: u32,
@@ -206,7 +218,7 @@ fn go_alone<L: Lanes<16>, B: Bundle<L>, P: Probe>(
 
 /// What some of a window's packets see together.
 #[inline(always)]
-fn union<L: Lanes<16>>(window: &Window<L>, packets: L::Mask, blur: f32) -> Window<L> {
+fn union<L: Sixteen>(window: &Window<L>, packets: L::Mask, blur: f32) -> Window<L> {
     let (low, high) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
     Window::new(
         [
@@ -221,19 +233,6 @@ fn union<L: Lanes<16>>(window: &Window<L>, packets: L::Mask, blur: f32) -> Windo
         L::splat(L::select(packets, window.farthest, high).greatest()),
         blur,
     )
-}
-
-/// What one packet sees.
-#[inline(always)]
-fn one<L: Lanes<16>>(window: &Window<L>, packet: usize) -> Window<L> {
-    Window {
-        low: [window.low[0].lane(packet), window.low[1].lane(packet)],
-        high: [window.high[0].lane(packet), window.high[1].lane(packet)],
-        center: [window.center[0].lane(packet), window.center[1].lane(packet)],
-        half: [window.half[0].lane(packet), window.half[1].lane(packet)],
-        nearest: window.nearest.lane(packet),
-        farthest: window.farthest.lane(packet),
-    }
 }
 
 /// The places of the bits that are set.

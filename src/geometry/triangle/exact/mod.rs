@@ -25,7 +25,6 @@ pub struct Filter<const W: usize, L: Lanes<W>> {
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     type Record = Triangle;
-    type Placed = ();
     type Kept = <Shear<W, L> as Test<W, L>>::Kept;
 
     #[inline(always)]

@@ -19,9 +19,8 @@ mod alone;
 mod distance;
 mod placed;
 
-use super::{Candidate, Corners, Lanes3, RENAMED, Test, Triangle};
+use super::{Candidate, Corners, Lanes3, Placed, RENAMED, Test, Triangle};
 use crate::simd::{Lanes, Mask};
-use placed::Placed;
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
 #[derive(Clone, Copy)]
@@ -127,7 +126,6 @@ impl<const W: usize, L: Lanes<W>> Default for Sheared<W, L> {
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     type Record = Triangle;
-    type Placed = Placed;
     const DEFERS: bool = true;
     /// The shear.
     type Kept = Sheared<W, L>;
@@ -188,13 +186,22 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     }
 
     #[inline(always)]
-    fn place(triangle: &Triangle, apex: &[f32; 3], axis: usize, sign: f32, edges: &[[f32; 4]; 3]) -> Placed {
-        Placed::new(triangle, apex, axis, sign, edges)
+    fn weigh(&self, triangle: &Triangle, lanes: L::Mask) -> [L; 2] {
+        let [a, b, c] = &triangle.corners;
+        let corners = [self.sheared(a), self.sheared(b), self.sheared(c)];
+        let (_, [_, b, c], sum) = edge_functions(&corners, lanes);
+        [b / sum, c / sum]
     }
 
     #[inline(always)]
-    fn test_placed(&self, triangle: &Triangle, placed: &Placed, lanes: L::Mask) -> Candidate<W, L> {
-        self.test_beam(triangle, placed, lanes)
+    fn test_placed(
+        kept: &Self::Kept,
+        direction: &Lanes3<L>,
+        placed: &Placed,
+        which: usize,
+        lanes: L::Mask,
+    ) -> Option<Candidate<W, L>> {
+        placed::test_beam(&kept.0, direction, placed, which, lanes)
     }
 }
 
@@ -202,37 +209,44 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// The test of a triangle with its corners sheared.
     #[inline(always)]
     fn decide(&self, triangle: &Triangle, corners: [Lanes3<L>; 3], lanes: L::Mask) -> Candidate<W, L> {
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
-
-        // Edge functions: each is opposite to the corner whose weight it is.
-        let mut a = cx * by - cy * bx;
-        let mut b = ax * cy - ay * cx;
-        let mut c = bx * ay - by * ax;
-
-        // All of one sign, zeros allowed: not both a negative and a positive one.
-        let zero = L::splat(0.0);
-        let mut inside = lanes & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+        let (inside, edges, sum) = edge_functions(&corners, lanes);
         if !inside.any() {
             return Candidate::none(inside);
         }
-
-        // Where an edge function is zero, its sign is not known: ask double precision.
-        let unsure = (a.eq(zero) | b.eq(zero) | c.eq(zero)) & inside;
-        if unsure.any() {
-            let sheared = [ax.store(), ay.store(), bx.store(), by.store(), cx.store(), cy.store()];
-            let edges = edges_in_double(unsure.bits(), &sheared, [a.store(), b.store(), c.store()]);
-            (a, b, c) = (L::load(&edges[0]), L::load(&edges[1]), L::load(&edges[2]));
-            inside = inside & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
-        }
-
-        // The weights' sum is zero for a triangle seen edge-on, NaN where anything was NaN.
-        let sum = a + b + c;
-        inside = inside & (sum.lt(zero) | zero.lt(sum));
-
-        let t = self.distance(triangle, inside, &[az, bz, cz]);
+        let t = self.distance(triangle, inside, &corners, &edges);
+        let [_, b, c] = edges;
         // No reciprocal: that of a denormal sum would be infinite.
         Candidate { inside, t, u: b / sum, v: c / sum }
     }
+}
+
+/// Which of the lanes in `lanes` are inside of a triangle with its corners sheared; the edge functions, each
+/// opposite to the corner whose weight it is, and their sum.
+#[inline(always)]
+fn edge_functions<const W: usize, L: Lanes<W>>(
+    [[ax, ay, _], [bx, by, _], [cx, cy, _]]: &[Lanes3<L>; 3],
+    lanes: L::Mask,
+) -> (L::Mask, Lanes3<L>, L) {
+    let mut a = *cx * *by - *cy * *bx;
+    let mut b = *ax * *cy - *ay * *cx;
+    let mut c = *bx * *ay - *by * *ax;
+
+    // All of one sign, zeros allowed: not both a negative and a positive one.
+    let zero = L::splat(0.0);
+    let mut inside = lanes & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+
+    // Where an edge function is zero, its sign is not known: ask double precision.
+    let unsure = (a.eq(zero) | b.eq(zero) | c.eq(zero)) & inside;
+    if unsure.any() {
+        let sheared = [ax.store(), ay.store(), bx.store(), by.store(), cx.store(), cy.store()];
+        let edges = edges_in_double(unsure.bits(), &sheared, [a.store(), b.store(), c.store()]);
+        (a, b, c) = (L::load(&edges[0]), L::load(&edges[1]), L::load(&edges[2]));
+        inside = inside & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+    }
+
+    // The weights' sum is zero for a triangle seen edge-on, NaN where anything was NaN.
+    let sum = a + b + c;
+    (inside & (sum.lt(zero) | zero.lt(sum)), [a, b, c], sum)
 }
 
 /// The edge functions of the lanes in `lanes`, computed in double precision; those of the other
