@@ -94,6 +94,10 @@ impl<const N: usize> Contender for Run<'_, N> {
         self.scene.bytes()
     }
 
+    fn fetch(&self, chunk: usize) {
+        self.lots[chunk].fetch(Prepared::as_slice);
+    }
+
     fn trace(&self, chunk: usize) {
         self.lots[chunk].trace(
             |rays, hits| self.scene.closest(rays, self.coherence, hits),

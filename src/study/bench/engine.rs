@@ -1,6 +1,7 @@
 //! What the bench asks of an engine, and the memory that its runs share.
 
 use crate::geometry::{Accuracy, Hit, Ray};
+use crate::simd::prefetch;
 use std::sync::{Mutex, PoisonError};
 
 /// Rays that a worker takes at a time.
@@ -41,6 +42,9 @@ pub trait Contender: Sync {
 
     /// Bytes that its tree holds.
     fn bytes(&self) -> u64;
+
+    /// Brings a chunk's rays, and the memory for its results, into the caches: before the clock runs.
+    fn fetch(&self, _chunk: usize) {}
 
     /// Traces one chunk and writes its results; the chunks of a set may run at the same time.
     fn trace(&self, chunk: usize);
@@ -107,6 +111,15 @@ impl<R, C: Clone, A: Clone + Default> Lot<R, C, A> {
         rays.chunks(CHUNK).map(lot).collect()
     }
 
+    /// Brings the lot into the caches: the memory for results, and the slice that the rays are in.
+    pub fn fetch<T>(&self, rays: impl FnOnce(&R) -> &[T]) {
+        fetch(rays(&self.rays));
+        match &*self.out.lock().unwrap_or_else(PoisonError::into_inner) {
+            Out::Closest(hits) => fetch(hits),
+            Out::Any(hits) => fetch(hits),
+        }
+    }
+
     /// Runs one of two tracers, whichever kind of result this lot is for.
     #[inline(always)]
     pub fn trace(&self, closest: impl FnOnce(&R, &mut [C]), any: impl FnOnce(&R, &mut [A])) {
@@ -114,6 +127,15 @@ impl<R, C: Clone, A: Clone + Default> Lot<R, C, A> {
             Out::Closest(hits) => closest(&self.rays, hits),
             Out::Any(hits) => any(&self.rays, hits),
         }
+    }
+}
+
+/// Asks for all the cache lines of a slice.
+fn fetch<T>(slice: &[T]) {
+    const LINE: usize = 64;
+    let start = slice.as_ptr().cast::<u8>();
+    for offset in (0..size_of_val(slice)).step_by(LINE) {
+        prefetch(start.wrapping_add(offset));
     }
 }
 

@@ -67,6 +67,10 @@ impl Contender for Run<'_> {
         self.scene.bytes()
     }
 
+    fn fetch(&self, chunk: usize) {
+        self.lots[chunk].fetch(Prepared::as_slice);
+    }
+
     fn trace(&self, chunk: usize) {
         self.lots[chunk]
             .trace(|rays, hits| self.scene.closest(rays, hits), |rays, flags| self.scene.any(rays, flags));

@@ -214,6 +214,10 @@ impl Contender for SliceRun<'_> {
         self.engine.bytes()
     }
 
+    fn fetch(&self, chunk: usize) {
+        self.lots[chunk].fetch(Vec::as_slice);
+    }
+
     fn trace(&self, chunk: usize) {
         let accel = &self.engine.accel;
         let lot = &self.lots[chunk];
@@ -301,6 +305,10 @@ where
 
     fn bytes(&self) -> u64 {
         self.engine.bytes()
+    }
+
+    fn fetch(&self, chunk: usize) {
+        self.lots[chunk].fetch(|rays| &rays.packets);
     }
 
     fn trace(&self, chunk: usize) {

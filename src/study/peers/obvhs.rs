@@ -105,6 +105,11 @@ impl Prepared {
         Self(rays.iter().map(convert).collect())
     }
 
+    /// Where they are.
+    pub fn as_slice(&self) -> &[impl Sized + use<>] {
+        &self.0
+    }
+
     /// How many.
     pub fn len(&self) -> usize {
         self.0.len()

@@ -69,6 +69,11 @@ impl<const N: usize> Prepared<N> {
         self.rays
     }
 
+    /// Where they are.
+    pub fn as_slice(&self) -> &[impl Sized + use<N>] {
+        &self.packets
+    }
+
     /// How many packets.
     pub fn packets(&self) -> usize {
         self.packets.len()
