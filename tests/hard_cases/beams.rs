@@ -263,3 +263,40 @@ fn beams_that_do_not_pay_are_given_up() {
         }
     }
 }
+
+/// Sixteen points in a row for each of sixteen packets under a ceiling of small triangles, `spread` apart in one of the
+/// packets, as where a square of a picture lies across an edge; what a light above sees of them.
+fn one_packet_apart(spread: f32) -> (TileCounts, [u32; 16], [u32; 16]) {
+    let light = Vec3::new(0.05, 2.0, 0.05);
+    let ceiling = of_triangles((0..400).map(|i| {
+        let corner = Vec3::new((i % 20) as f32 - 10.0, 10.0, (i / 20) as f32 - 10.0) * 0.1;
+        [corner, corner + Vec3::X * 0.05, corner + Vec3::Z * 0.05]
+    }));
+    let rays: Vec<Ray> = (0..256)
+        .map(|i: u32| {
+            let (packet, lane) = (i / 16, i % 16);
+            let step = if packet == 7 { spread } else { 0.004 };
+            let point = Vec3::new(lane as f32 * step, 0.0, packet as f32 * 0.01);
+            Ray::segment(point, light - point, 0.0, 1.0)
+        })
+        .collect();
+    let accel = Accel::build(&ceiling, &BuildParams::default()).expect("builds");
+    let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+    let (mut counts, mut together) = (TileCounts::default(), [0; 16]);
+    accel.count_tile(&packets, &[0xffff; 16], true, &mut counts);
+    accel.occluded_tile(&packets, &[0xffff; 16], &mut together);
+    let alone = std::array::from_fn(|packet| accel.occluded_packet(&packets[packet], 0xffff));
+    (counts, together, alone)
+}
+
+#[test]
+fn a_packet_that_a_light_sees_as_two_places_goes_alone() {
+    let (alike, together, alone) = one_packet_apart(0.004);
+    assert_eq!(together, alone);
+    let (apart, together, alone) = one_packet_apart(0.04);
+    assert_eq!(together, alone);
+    assert_eq!((alike.beams, apart.beams), (1, 1));
+    assert!(apart.alone > alike.alone, "{alike:?} {apart:?}");
+    // The others see no more for it.
+    assert!(apart.node_packets <= alike.node_packets, "{alike:?} {apart:?}");
+}
