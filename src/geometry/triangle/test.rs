@@ -122,7 +122,7 @@ pub trait Mode {
     /// Its name.
     const ACCURACY: Accuracy;
     /// Whether its test says of every ray that passes the edges by more than the error bounds of
-    /// [`Test::place`] on which side it does.
+    /// [`Placed`] on which side it does.
     const SURE: bool;
     /// What is kept of each triangle.
     type Record: Send + Sync;
