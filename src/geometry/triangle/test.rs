@@ -39,8 +39,7 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
 
     /// What [`test`](Self::test) answers of the triangle `which` of those in `placed`, to the bit, if that can be
     /// told from what was kept of rays from the apex that they were prepared for, and from the rays' directions,
-    /// renamed likewise. `None` if not. (What is
-    /// said of lanes that are not in `lanes` means nothing.)
+    /// renamed likewise. `None` if not. What is said of lanes that are not in `lanes` means nothing.
     #[inline(always)]
     fn test_placed(
         _kept: &Self::Kept,
