@@ -17,7 +17,7 @@ mod test;
 pub mod watertight;
 
 pub use accuracy::Accuracy;
-pub use placed::{Placed, Row};
+pub use placed::{Placed, Row, side};
 pub use record::Triangle;
 pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Test, Watertight};
 

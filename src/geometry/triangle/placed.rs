@@ -36,7 +36,13 @@ impl Placed {
     #[inline(always)]
     pub fn side<const W: usize, L: Lanes<W>>(&self, which: usize, edge: usize, x: L, y: L) -> L {
         let [by_x, by_y, constant] = &self.edges[edge];
-        let [by_x, by_y, constant] = [by_x[which & 15], by_y[which & 15], constant[which & 15]];
-        L::splat(by_x).mul_add(x, L::splat(by_y).mul_add(y, L::splat(constant)))
+        side([by_x, by_y, constant], which, x, y)
     }
+}
+
+/// `by_x x + by_y y + constant` for the triangle `which` of sixteen.
+#[inline(always)]
+pub fn side<const W: usize, L: Lanes<W>>([by_x, by_y, constant]: [&Row; 3], which: usize, x: L, y: L) -> L {
+    let which = which & 15;
+    L::splat(by_x[which]).mul_add(x, L::splat(by_y[which]).mul_add(y, L::splat(constant[which])))
 }

@@ -27,7 +27,7 @@
 //! about a hit.
 
 use super::beam::{Beam, Frame, Spread};
-use crate::geometry::triangle::{Placed, Row, Triangle};
+use crate::geometry::triangle::{Placed, Row, Triangle, side};
 use crate::simd::{Lanes, Sixteen};
 
 /// By how much outlines are widened, relative to the farthest corner.
@@ -345,9 +345,8 @@ impl Block {
     /// What an edge of one lane's triangle is for rays at places `a` and `b`.
     #[inline(always)]
     pub fn side<const W: usize, R: Lanes<W>>(&self, lane: usize, edge: usize, a: R, b: R) -> R {
-        let lane = lane & 15;
         let [x, y, z, _] = &self.edges[edge];
-        R::splat(x[lane]).mul_add(a, R::splat(y[lane]).mul_add(b, R::splat(z[lane])))
+        side([x, y, z], lane, a, b)
     }
 
     /// What that may be off by, at most, whichever the edge.

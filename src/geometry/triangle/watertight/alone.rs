@@ -4,7 +4,7 @@
 //! operation by operation, so it has the same bits. What that test seldom does (signs in double precision,
 //! clipping rays that graze the plane, triangles without area) is left to it.
 
-use super::distance::{FLAT, GRAZING, is_well_inside};
+use super::distance::are_clipped;
 use super::{Shear, likely};
 use crate::geometry::triangle::{Alone, Finds, Lanes3, RENAMED, Triangle};
 use crate::simd::{Eight, Mask};
@@ -96,13 +96,9 @@ impl Alone for Shear<1, f32> {
         let t = (height / speed).max(nearest).min(farthest);
 
         // A triangle without area has a plane of zeros, and so no speed.
-        let mut grazes = inside & !L::splat(GRAZING * dz.abs()).le(speed.abs());
-        if grazes.any() {
-            let sheared = [[ax, ay, depth_a], [bx, by, depth_b], [cx, cy, depth_c]];
-            let clipped = !(is_well_inside(&sheared, &[a, b, c]) & L::splat(FLAT * dz.abs()).le(speed.abs()));
-            grazes = grazes & clipped;
-        }
-        let open = inside & (grazes | a.eq(zero) | b.eq(zero) | c.eq(zero));
+        let sheared = [[ax, ay, depth_a], [bx, by, depth_b], [cx, cy, depth_c]];
+        let clipped = are_clipped(inside, &sheared, &[a, b, c], speed, L::splat(dz.abs()));
+        let open = inside & (clipped | a.eq(zero) | b.eq(zero) | c.eq(zero));
         let sum = a + b + c;
         let hits = inside & !open & (sum.lt(zero) | zero.lt(sum));
         let hits = hits & L::splat(tnear).le(t) & t.le(L::splat(tfar));

@@ -19,7 +19,7 @@ use crate::simd::{Lanes, Mask};
 use glam::DVec3;
 
 /// A ray whose cosine with the normal is less than about this grazes the plane.
-pub(super) const GRAZING: f32 = 0.25;
+const GRAZING: f32 = 0.25;
 
 /// The same for a ray that passes all edges by a margin: there is nothing to clip then.
 ///
@@ -51,16 +51,10 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         edges: &Lanes3<L>,
     ) -> L {
         let Triangle { corners, plane } = triangle;
-        let line = *plane == [0.0; 3];
-        let (t, speed) = if line { self.meet_line(corners) } else { self.meet_plane(*plane, &corners[0]) };
-
-        let steepness = self.direction[2].abs();
-        let mut grazing = inside & !(L::splat(GRAZING) * steepness).le(speed.abs());
-        if grazing.any() && !line {
-            grazing =
-                grazing & !(is_well_inside(sheared, edges) & (L::splat(FLAT) * steepness).le(speed.abs()));
-        }
-        let t = if grazing.any() { L::select(grazing, self.clip(corners, t), t) } else { t };
+        let (t, speed) =
+            if *plane == [0.0; 3] { self.meet_line(corners) } else { self.meet_plane(*plane, &corners[0]) };
+        let clipped = are_clipped(inside, sheared, edges, speed, self.direction[2].abs());
+        let t = if clipped.any() { L::select(clipped, self.clip(corners, t), t) } else { t };
 
         let [[_, _, az], [_, _, bz], [_, _, cz]] = *sheared;
         let scale = self.shear[2];
@@ -136,10 +130,28 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     }
 }
 
+/// The lanes in `inside` whose `t` may have to be clipped: those that graze the plane, because the `speed` along its
+/// normal is small beside that along the greatest axis, or is none (a NaN), and that pass near an edge. (Of a triangle
+/// without area the clip leaves `t` as it is.)
+#[inline(always)]
+pub(super) fn are_clipped<const W: usize, L: Lanes<W>>(
+    inside: L::Mask,
+    sheared: &[Lanes3<L>; 3],
+    edges: &Lanes3<L>,
+    speed: L,
+    along: L,
+) -> L::Mask {
+    let grazing = inside & !(L::splat(GRAZING) * along).le(speed.abs());
+    if !grazing.any() {
+        return grazing;
+    }
+    grazing & !(is_well_inside(sheared, edges) & (L::splat(FLAT) * along).le(speed.abs()))
+}
+
 /// Lanes whose ray passes the edges of a triangle with its corners sheared by so much that nothing is to be clipped,
 /// unless the ray is all but in the plane: see `FLAT`.
 #[inline(always)]
-pub(super) fn is_well_inside<const W: usize, L: Lanes<W>>(
+fn is_well_inside<const W: usize, L: Lanes<W>>(
     [[ax, ay, az], [bx, by, bz], [cx, cy, cz]]: &[Lanes3<L>; 3],
     [a, b, c]: &Lanes3<L>,
 ) -> L::Mask {
