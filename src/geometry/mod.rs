@@ -4,6 +4,7 @@
 
 mod aabb;
 pub mod clip;
+pub mod cut;
 mod hit;
 mod ray;
 pub mod triangle;

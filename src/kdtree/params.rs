@@ -33,8 +33,8 @@ pub struct BuildParams {
     /// Depth limit, at most 64; 0 derives it from the number of triangles, which is where to start. Lowering it
     /// cuts subtrees off, which then are large leaves.
     pub max_depth: usize,
-    /// Bins per axis for nodes above `exact_below`, 8 to 1024. Raising it finds better planes in large nodes and
-    /// makes the build slower; start from 32.
+    /// Bins per axis for nodes above `exact_below`, 8 to 1024, but no more than a small node has triangles. Raising it
+    /// finds better planes in large nodes and makes the build slower; start from 32.
     pub bins: usize,
     /// Nodes with fewer triangles than this are swept exactly, endpoint by endpoint. Raising it makes the build
     /// slower and the tree's lower levels a little better; start from 32.
@@ -44,9 +44,10 @@ pub struct BuildParams {
     /// bundle). Real models have some 5; with a `traversal_cost` near 1 they would have 10. Start
     /// from 8; `--memory` lowers it to what fits.
     pub max_duplication: f32,
-    /// Whether planes are looked for at the ends of triangles, and triangles that a plane cuts are clipped to each
-    /// of its sides ("perfect splits"). `false` takes boundaries of bins and cuts boxes: the build takes half of the
-    /// time, leaves list triangles that do not reach into them, and rays are some tenths slower.
+    /// Whether planes are looked for at the ends of triangles, and triangles that a plane cuts are clipped to all of
+    /// each side's cell ("perfect splits"). `false` takes boundaries of bins and cuts triangles by one plane after the
+    /// other: the build takes half of the time, some leaves list triangles that do not reach into them, and rays are
+    /// a tenth or two slower.
     pub perfect: bool,
     /// A subtree of at most this many triangles is a page, in which a tile of rays looks at all
     /// triangles at once. Raising it saves tiles steps and costs them tests; 64 is a good start.

@@ -61,11 +61,11 @@ impl BuildParams {
             Preset::Preview => Self {
                 preset,
                 traversal_cost: 12.0,
-                min_leaf: 16,
+                min_leaf: 8,
                 bad_splits: 0,
                 bins: 64,
                 exact_below: 0,
-                max_duplication: 3.0,
+                max_duplication: 4.0,
                 perfect: false,
                 ..standard
             },

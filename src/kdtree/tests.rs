@@ -1,6 +1,7 @@
 //! Trees of small meshes: whole, tight, bounded, and the same for any number of threads.
 
 use super::*;
+use crate::geometry::clip::Polygon;
 use crate::mesh::Colors;
 use glam::Vec3;
 
@@ -84,12 +85,39 @@ fn a_large_soup_pays_off() {
     assert_eq!(stats.leaf_histogram.iter().sum::<usize>(), stats.leaves);
 }
 
+/// The references to triangles of which nothing reaches into the leaf's cell.
+fn strays(tree: &KdTree) -> usize {
+    let mut strays = 0;
+    let mut stack = vec![(tree.root(), *tree.bounds())];
+    while let Some((node, cell)) = stack.pop() {
+        if !node.is_leaf() {
+            let halves = cell.halves(node.axis(), node.split());
+            stack.extend(tree.children(node).into_iter().zip(halves));
+            continue;
+        }
+        for &primitive in tree.primitives(node) {
+            let mut piece = Polygon::new(tree.corners(primitive));
+            for axis in 0..3 {
+                piece.clip(axis, cell.min[axis], false);
+                piece.clip(axis, cell.max[axis], true);
+            }
+            strays += usize::from(piece.is_empty());
+        }
+    }
+    strays
+}
+
 #[test]
-fn perfect_splits_cut_less() {
+fn perfect_splits_leave_no_strays_and_quick_ones_few() {
     let params =
         |perfect| BuildParams { perfect, exact_below: 0, max_duplication: 100.0, ..Default::default() };
-    let [rough, perfect] = [false, true].map(|perfect| checked(&soup(5_000, 1.0, 1), &params(perfect)));
-    assert!(perfect.expected_tests < 0.95 * rough.expected_tests, "{perfect:?}, {rough:?}");
+    let [quick, perfect] = [false, true].map(|perfect| {
+        let tree = KdTree::build(&soup(5_000, 1.0, 1), &params(perfect), None).expect("builds");
+        tree.validate().expect("is whole");
+        (strays(&tree), tree.stats().references)
+    });
+    assert_eq!(perfect.0, 0, "of {}", perfect.1);
+    assert!(0 < quick.0 && quick.0 < quick.1 / 20, "{} of {}", quick.0, quick.1);
 }
 
 #[test]

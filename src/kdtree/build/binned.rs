@@ -9,6 +9,7 @@ use super::reference::Reference;
 use crate::geometry::Aabb;
 use crate::kdtree::params::MOST_BINS;
 use crate::kdtree::sah::{AxisCost, CellCost, Split, cheaper};
+use crate::simd::{Chosen, Lanes, Simd, Task};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// The least box around all references; grows as they are shown.
@@ -60,7 +61,8 @@ impl Frame {
         // No length, or one that overflows: then one bin has it all, and the ends are tried all the same.
         let scale = Vec3::select(scale.is_finite_mask(), scale, Vec3::ZERO);
         Self {
-            low: extent.min.extend(0.0),
+            // Ids in the last lane are subnormal numbers, slow to multiply; less one they are not.
+            low: extent.min.extend(1.0),
             scale: scale.extend(0.0),
             width: (extent.extent() / bins as f32).extend(0.0),
             last: bins as f32 - 1.0,
@@ -103,15 +105,8 @@ impl Table {
         self.counts[..bins].fill([0; 8]);
     }
 
-    pub fn count(&mut self, references: &[Reference], frame: &Frame) {
-        let counts = &mut *self.counts;
-        for reference in references {
-            let (starts, ends) = (frame.of(reference.low()), frame.of(reference.high()));
-            for axis in 0..3 {
-                counts[starts[axis] as usize % MOST_BINS][axis] += 1;
-                counts[ends[axis] as usize % MOST_BINS][4 + axis] += 1;
-            }
-        }
+    pub fn count(&mut self, isa: Chosen, references: &[Reference], frame: &Frame) {
+        isa.run(Counting { references, frame, counts: &mut self.counts });
     }
 
     pub fn add(&mut self, other: &Self) {
@@ -175,6 +170,35 @@ impl Table {
         let between = &self.counts[bin - 1];
         let (below, above) = (below + between[axis] as usize, above - between[4 + axis] as usize);
         costs.axis(axis).split(frame.boundaries(bin)[axis], below, 0, above)
+    }
+}
+
+/// A pass over references: begins and ends of each in one register.
+struct Counting<'a> {
+    references: &'a [Reference],
+    frame: &'a Frame,
+    counts: &'a mut [[u32; 8]; MOST_BINS],
+}
+
+impl Task for Counting<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { references, frame, counts } = self;
+        let twice = |four: Vec4| [four.x, four.y, four.z, four.w, four.x, four.y, four.z, four.w];
+        let (low, scale) = (S::F8::load(&twice(frame.low)), S::F8::load(&twice(frame.scale)));
+        let (half, zero, last) = (S::F8::splat(0.5), S::F8::splat(0.0), S::F8::splat(frame.last));
+        for reference in references {
+            // As in `Frame::of`, to the bit.
+            let bin = (S::F8::load(reference.corners()) - low) * scale - half;
+            let bins = (bin.max(zero).min(last) + S::F8::splat(ROUND)).store();
+            for axis in 0..3 {
+                let (start, end) = (bins[axis].to_bits() as usize, bins[4 + axis].to_bits() as usize);
+                counts[start % MOST_BINS][axis] += 1;
+                counts[end % MOST_BINS][4 + axis] += 1;
+            }
+        }
     }
 }
 

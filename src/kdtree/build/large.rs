@@ -16,6 +16,7 @@ use crate::kdtree::memory::{Ledger, bytes_of};
 use crate::kdtree::node::Node;
 use crate::kdtree::params::{BuildParams, MOST_BINS};
 use crate::kdtree::sah::{CellCost, Split};
+use crate::simd::Chosen;
 use rayon::prelude::*;
 use std::convert::Infallible;
 
@@ -97,7 +98,7 @@ pub fn build(context: &Context, chunks: Chunks, place: Place) -> Part {
         return Part::Whole(subtree::build(context, references, place));
     }
     let split = context.may_split(count, &place).and_then(|costs| {
-        let Ok(split) = best_split(context.params, &chunks, count, &costs);
+        let Ok(split) = best_split(context.isa, context.params, &chunks, count, &costs);
         let split = split?;
         (split.cost < costs.leaf(count)).then_some(split)
     });
@@ -131,6 +132,7 @@ fn leaf(context: &Context, chunks: Chunks, place: &Place) -> Part {
 
 /// The cheapest plane found; `None` if none divides.
 pub fn best_split<G: Gather>(
+    isa: Chosen,
     params: &BuildParams,
     references: &G,
     count: usize,
@@ -149,7 +151,7 @@ pub fn best_split<G: Gather>(
         table
     };
     let counted = |mut table: Table, chunk: &[Reference]| {
-        table.count(chunk, &frame);
+        table.count(isa, chunk, &frame);
         table
     };
     let added = |mut a: Table, b: Table| {

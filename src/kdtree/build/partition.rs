@@ -1,7 +1,8 @@
-//! Dividing references by a plane, with those that cross it clipped to each side.
+//! Dividing references by a plane, with those that cross it clipped to each side, or cut by it.
 
 use super::reference::Reference;
 use crate::geometry::clip::Clipper;
+use crate::geometry::cut;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::kdtree::sah::Split;
 use crate::simd::{Chosen, Simd, Task};
@@ -34,7 +35,8 @@ impl Divider {
     /// Every reference goes to each side that its part in the cell reaches into: a triangle that only
     /// touches the plane stays on its own side, one that lies in the plane goes to the side that the
     /// split names. One that crosses is clipped to both sides, and left out of a side that its true
-    /// shape does not reach (its bounds had overstated it). Unless `clips`, its bounds are cut instead.
+    /// shape does not reach (its bounds had overstated it). Unless `clips`, it is cut by this plane alone,
+    /// and left out where even that shows that it does not reach.
     pub fn divide<T: Lookup + ?Sized>(
         &mut self,
         isa: Chosen,
@@ -90,20 +92,17 @@ impl<T: Lookup + ?Sized> Task for Division<'_, T> {
                 list[stay] = reference;
                 go += usize::from(goes);
                 stay += usize::from(!goes);
-            } else if !clips {
-                let [mut part_below, mut part_above] = [reference.bounds(); 2];
-                (part_below.max[axis], part_above.min[axis]) = (position, position);
-                below[go] = Reference::new(reference.primitive(), &part_below);
-                list[stay] = Reference::new(reference.primitive(), &part_above);
-                go += 1;
-                stay += 1;
             } else {
-                let primitive = reference.primitive();
+                let (primitive, bounds) = (reference.primitive(), reference.bounds());
                 let corners = triangles.corners(primitive);
-                let parts = clipper.halves(corners, &reference.bounds(), axis, position);
+                let parts = if clips {
+                    clipper.halves(corners, &bounds, axis, position)
+                } else {
+                    cut::halves(corners, &bounds, axis, position)
+                };
                 // Rounding outward never loses both; if clipping ever did, keep the triangle whole.
                 let lost = parts == [None; 2];
-                let whole = lost.then(|| reference.bounds());
+                let whole = lost.then_some(bounds);
                 let [part_below, part_above] = parts.map(|part| part.or(whole));
                 if let Some(bounds) = part_below {
                     below[go] = Reference::new(primitive, &bounds);

@@ -59,6 +59,12 @@ impl Reference {
         Vec4::from_array(self.high)
     }
 
+    /// The least corner and the greatest. The last lane of each may hold anything.
+    #[inline(always)]
+    pub fn corners(&self) -> &[f32; 8] {
+        bytemuck::cast_ref(self)
+    }
+
     pub fn bounds(&self) -> Aabb {
         Aabb { min: Vec3::from_slice(&self.low[..3]), max: Vec3::from_slice(&self.high[..3]) }
     }

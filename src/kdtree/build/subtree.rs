@@ -51,6 +51,9 @@ pub fn build(context: &Context, references: Vec<Reference>, place: Place) -> Sub
     Subtree { root, nodes, references }
 }
 
+/// Bins that even a handful of references is worth.
+const LEAST_BINS: usize = 16;
+
 /// Memory that the search for splits reuses.
 #[derive(Default)]
 pub struct Scratch {
@@ -66,9 +69,11 @@ impl Scratch {
         if count >= params.exact_below.max(2) {
             let mut extent = Extent::NONE;
             extent.grow(references);
-            let frame = Frame::new(&extent, params.bins);
-            self.table.reset(params.bins);
-            self.table.count(references, &frame);
+            // No more bins than there are ends.
+            let bins = params.bins.min(count.max(LEAST_BINS));
+            let frame = Frame::new(&extent, bins);
+            self.table.reset(bins);
+            self.table.count(context.isa, references, &frame);
             match self.table.best_boundary(&frame, costs, count) {
                 Some(boundary) if !params.perfect => self.table.coarse(&boundary, &frame, costs, count),
                 Some(boundary) => {

@@ -308,7 +308,7 @@ impl Builder<'_> {
         };
         // As a large node in memory: see `large::build`.
         let split = match context.may_split(count, &place) {
-            Some(costs) => large::best_split(params, &list.on(self.job), count, &costs)?
+            Some(costs) => large::best_split(context.isa, params, &list.on(self.job), count, &costs)?
                 .filter(|split| split.cost < costs.leaf(count)),
             None => None,
         };
