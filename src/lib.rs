@@ -67,6 +67,7 @@ pub mod column;
 pub mod error;
 pub mod files;
 pub mod geometry;
+mod huge;
 pub mod kdtree;
 pub mod mesh;
 pub mod profile;

@@ -76,12 +76,15 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Enters the epoch of now.
+    /// Enters the epoch of now, and says which is the present one then: nothing that is retired at that one or later
+    /// is freed before the reader leaves. (The one that it is in may be earlier, and what was retired at that one be
+    /// gone already.)
     #[inline]
-    pub fn enter(&self) {
+    pub fn enter(&self) -> u64 {
         let now = self.epochs.now.load(Ordering::SeqCst);
         self.epochs.slots[self.slot].store(now, Ordering::SeqCst);
         fence(Ordering::SeqCst);
+        self.epochs.now.load(Ordering::SeqCst)
     }
 
     /// Leaves it: everything that was found in it may be gone.

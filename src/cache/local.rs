@@ -2,6 +2,7 @@
 
 use super::blocks::Blocks;
 use super::epoch::Reader;
+use super::known::Known;
 use super::stats::{add, nanos};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -11,7 +12,10 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct Local {
     blocks: Arc<Blocks>,
-    pub reader: Reader,
+    reader: Reader,
+    /// The epoch that was the present one when this use began, or went on after a wait.
+    epoch: Cell<u64>,
+    pub known: Known,
     /// Uses inside of one another: the outermost one is in an epoch.
     depth: u32,
     /// Whether the thread has a place at the gate, which it keeps until it ends.
@@ -34,6 +38,8 @@ impl Local {
             _ => Box::new(Self {
                 blocks: Arc::clone(blocks),
                 reader: blocks.epochs.reader().expect("fewer than 4096 threads use a scene"),
+                epoch: Cell::new(0),
+                known: Known::new(),
                 depth: 0,
                 at_gate: false,
                 stalled: Cell::new(Duration::ZERO),
@@ -51,7 +57,7 @@ impl Local {
     pub fn begin(&mut self) {
         self.depth += 1;
         if self.depth == 1 {
-            self.reader.enter();
+            self.enter();
         }
     }
 
@@ -83,6 +89,23 @@ impl Local {
         if self.depth == 0 {
             self.reader.leave();
         }
+    }
+
+    /// Goes on with a use that was [left](Self::leave).
+    #[inline(always)]
+    pub fn enter(&self) {
+        self.epoch.set(self.reader.enter());
+    }
+
+    /// Leaves the epoch in the middle of a use, to wait for something.
+    pub fn leave(&self) {
+        self.reader.leave();
+    }
+
+    /// The epoch that was the present one when this use began, or went on.
+    #[inline(always)]
+    pub fn epoch(&self) -> u64 {
+        self.epoch.get()
     }
 
     /// Lets another thread go on while this one waits.

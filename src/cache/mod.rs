@@ -29,7 +29,7 @@
 //! | `deadline` | when threads stop waiting |
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
 //! | `blocks` | all of these at work: asking, loading, giving up |
-//! | `local`, `view` | a thread's state, and the tree as it sees it |
+//! | `local`, `known`, `view` | a thread's state, what it has seen, and the tree as it sees it |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
 //! | `source`, `file`, `at_once` | where blocks come from |
 //!
@@ -48,6 +48,7 @@ mod directory;
 mod epoch;
 mod file;
 mod gate;
+mod known;
 mod layout;
 mod local;
 mod plan;
@@ -69,6 +70,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
 use blocks::{Blocks, Late, Loaders};
+use known::Known;
 use layout::Layout;
 use local::Local;
 use std::panic::{self, AssertUnwindSafe};
@@ -136,9 +138,10 @@ impl Cached {
         let layout = Layout::new(resident.bytes, options.block);
         let size = SPREAD_BLOCKS.iter().position(|&block| block == options.block);
         let most = resident.spread[size.expect("it was checked")].clamp(2, layout.blocks().max(2));
-        let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
-        let blocks = memory.saturating_sub(overhead) / options.block;
         let workers = options.loading.workers(threads);
+        let own = workers * Known::bytes();
+        let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + own + beside;
+        let blocks = memory.saturating_sub(overhead) / options.block;
         // More than would ever be used is left to the system.
         let blocks = blocks.min(2 * layout.blocks() + Plan::least(options, most));
         let plan = Plan::new(options, blocks, most, workers);

@@ -124,11 +124,28 @@ impl<'a> View<'a> {
         if list.is_empty() {
             return;
         }
+        let (local, name) = (self.local(), part.base + list.start * size_of::<u32>());
+        if !local.known.has(name, local.epoch(), self.tick) {
+            self.look_at_list(part, list);
+            // By now it is whole, and the epoch may be another.
+            local.known.add(name, local.epoch(), self.tick);
+        }
+    }
+
+    /// The same, word by word.
+    #[inline(never)]
+    fn look_at_list(&self, part: &Part<u32>, list: Range<usize>) {
         let mut here = self.use_all(part.blocks(list.clone(), self.shift));
         if here {
+            let mut last = 0..0;
             for &primitive in self.slice(part, list.clone()) {
                 let primitive = primitive as usize;
-                here &= self.use_all(self.triangles.blocks(primitive..primitive + 1, self.shift));
+                let blocks = self.triangles.blocks(primitive..primitive + 1, self.shift);
+                // Triangles that follow one another lie mostly in one block.
+                if blocks != last {
+                    here &= self.use_all(blocks.clone());
+                    last = blocks;
+                }
             }
         }
         if !here {
@@ -159,7 +176,7 @@ impl<'a> View<'a> {
     fn gather(&self, wanted: &[u32]) {
         let (blocks, local) = (&self.cached.blocks, self.local());
         let start = Instant::now();
-        local.reader.leave();
+        local.leave();
         let mut is_aside = false;
         let gathered = blocks.gather(&self.cached.loaders, wanted, || {
             local.step_aside();
@@ -169,7 +186,7 @@ impl<'a> View<'a> {
             local.step_back();
         }
         // Before they are let go of, so that the epoch protects them from then on.
-        local.reader.enter();
+        local.enter();
         local.stalled(start.elapsed());
         match gathered {
             Ok(gathered) => drop(gathered),

@@ -36,6 +36,7 @@
 use super::node::Node;
 use crate::column::Column;
 use crate::geometry::Aabb;
+use crate::huge;
 use bytemuck::{Pod, Zeroable};
 
 /// A treelet.
@@ -135,7 +136,7 @@ impl Lines {
 
 /// The lines of a subtree that begins with a line of its own, numbered from 0.
 pub fn pack(nodes: &[Node], root: Node, cell: &Aabb) -> Vec<Line> {
-    let mut lines = vec![Line::NOTHING; count(nodes, root)];
+    let mut lines = huge::copies_of(Line::NOTHING, count(nodes, root));
     Treelets { nodes }.fill(&mut lines, 0, root, cell, 0);
     lines
 }
@@ -257,7 +258,7 @@ impl Line {
 /// moved accordingly. Records are in the order of a depth-first walk, as the references are.
 pub fn counted(nodes: &mut [Node], references: &[u32]) -> Vec<u32> {
     let leaves = nodes.iter().filter(|node| node.is_leaf() && !node.references().is_empty()).count();
-    let mut all = Vec::with_capacity(references.len() + leaves + AFTER);
+    let mut all = huge::room_for(references.len() + leaves + AFTER);
     let mut stack = vec![0];
     while let Some(index) = stack.pop() {
         let node = nodes[index];

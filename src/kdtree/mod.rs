@@ -32,6 +32,7 @@ use crate::column::Column;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
+use crate::huge;
 use crate::mesh::Mesh;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
@@ -222,7 +223,8 @@ fn gather(mesh: &Mesh) -> Result<(Vec<Triangle>, Aabb, Scale)> {
         let corners = indices.map(|index| mesh.positions[index as usize].to_array());
         Triangle::new(if scale.is_none() { corners } else { scale.apply(&corners) })
     };
-    let triangles: Vec<Triangle> = mesh.triangles.par_iter().map(record).collect();
+    let mut triangles: Vec<Triangle> = huge::room_for(mesh.triangles.len());
+    mesh.triangles.par_iter().map(record).collect_into_vec(&mut triangles);
     let bounds = if scale.is_none() {
         bounds
     } else {

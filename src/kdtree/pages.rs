@@ -15,6 +15,7 @@
 
 use super::node::Node;
 use crate::column::Column;
+use crate::huge;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -94,7 +95,7 @@ impl Cut {
             (primitives, counts)
         };
         let lists: Vec<(Vec<u32>, Vec<usize>)> = roots.par_chunks(PAGES_PER_TASK).map(list).collect();
-        self.primitives.reserve_exact(lists.iter().map(|(primitives, _)| primitives.len()).sum());
+        self.primitives = huge::room_for(lists.iter().map(|(primitives, _)| primitives.len()).sum());
         for (places, (primitives, counts)) in roots.chunks(PAGES_PER_TASK).zip(lists) {
             let mut first = self.primitives.len();
             for (&at, count) in places.iter().zip(counts) {

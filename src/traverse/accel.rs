@@ -250,8 +250,8 @@ impl Accel {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         let lanes = tile_lanes(rays, active);
         let done = self.ask(IntersectTile { rays, active: &lanes, hits: &mut *hits });
-        if !done {
-            for ((rays, active), hits) in rays.iter().zip(lanes).zip(hits) {
+        for (packet, ((rays, active), hits)) in rays.iter().zip(lanes).zip(hits).enumerate() {
+            if done >> packet & 1 == 0 {
                 *hits = self.intersect_packet(rays, active);
             }
         }
@@ -265,7 +265,7 @@ impl Accel {
         let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
         let done = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
-        counts.beams += u64::from(done);
+        counts.beams += u64::from(done != 0);
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet. Rays go
@@ -275,8 +275,8 @@ impl Accel {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         let lanes = tile_lanes(rays, active);
         let done = self.ask(OccludedTile { rays, active: &lanes, found: &mut *occluded });
-        if !done {
-            for ((rays, active), occluded) in rays.iter().zip(lanes).zip(occluded) {
+        for (packet, ((rays, active), occluded)) in rays.iter().zip(lanes).zip(occluded).enumerate() {
+            if done >> packet & 1 == 0 {
                 *occluded = self.occluded_packet(rays, active);
             }
         }

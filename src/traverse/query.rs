@@ -78,7 +78,7 @@ where
     }
 }
 
-/// The closest hits of a tile, if it is a beam.
+/// The closest hits of a tile's packets, of those that are a beam; which these are.
 pub struct IntersectTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -86,16 +86,16 @@ pub struct IntersectTile<'a> {
 }
 
 impl Query for IntersectTile<'_> {
-    type Output = bool;
+    type Output = u32;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
         let Self { rays, active, hits } = self;
         tile::intersect::<S, _, M, _>(tree, rays, active, hits, &mut ())
     }
 }
 
-/// The lanes of a tile that hit anything, if it is a beam.
+/// The lanes of a tile that hit anything, in the packets that are a beam; which these are.
 pub struct OccludedTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -103,16 +103,16 @@ pub struct OccludedTile<'a> {
 }
 
 impl Query for OccludedTile<'_> {
-    type Output = bool;
+    type Output = u32;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
         let Self { rays, active, found } = self;
         tile::occluded::<S, _, M, _>(tree, rays, active, found, &mut ())
     }
 }
 
-/// What the tile kernel does with a tile; whether it is a beam.
+/// What the tile kernel does with a tile; which of its packets are a beam.
 pub struct CountTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -121,10 +121,10 @@ pub struct CountTile<'a> {
 }
 
 impl Query for CountTile<'_> {
-    type Output = bool;
+    type Output = u32;
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> bool {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
         let Self { rays, active, any_hit, counts } = self;
         if any_hit {
             let found = &mut [0; PACKETS][..rays.len()];

@@ -8,7 +8,8 @@ use raypack::Vec3;
 use raypack::geometry::{Hit, Ray};
 use raypack::kdtree::BuildParams;
 use raypack::mesh::Mesh;
-use raypack::traverse::{Accel, Kernel, RayPacket, TileCounts};
+use raypack::simd::Isa;
+use raypack::traverse::{Accel, HitPacket, Kernel, RayPacket, TileCounts};
 
 /// Rays from a point, sorted by where they go: neighbours go nearly the same way.
 fn sorted(eye: Vec3, targets: impl IntoIterator<Item = Vec3>) -> Vec<Ray> {
@@ -299,4 +300,66 @@ fn a_packet_that_a_light_sees_as_two_places_goes_alone() {
     assert!(apart.alone > alike.alone, "{alike:?} {apart:?}");
     // The others see no more for it.
     assert!(apart.node_packets <= alike.node_packets, "{alike:?} {apart:?}");
+}
+
+/// What a tile's packets find together and one by one; how many beams it was.
+struct TogetherAndAlone {
+    beams: u64,
+    hits: [[HitPacket<16>; 16]; 2],
+    occluded: [[u32; 16]; 2],
+}
+
+fn together_and_alone(accel: &Accel, packets: &[RayPacket<16>]) -> TogetherAndAlone {
+    let all = [0xffff; 16];
+    let mut counts = TileCounts::default();
+    accel.count_tile(packets, &all, false, &mut counts);
+    let mut hits = [const { HitPacket::miss() }; 16];
+    accel.intersect_tile(packets, &all, &mut hits);
+    let hits_alone = std::array::from_fn(|packet| accel.intersect_packet(&packets[packet], 0xffff));
+    let mut occluded = [0; 16];
+    accel.occluded_tile(packets, &all, &mut occluded);
+    let occluded_alone = std::array::from_fn(|packet| accel.occluded_packet(&packets[packet], 0xffff));
+    TogetherAndAlone { beams: counts.beams, hits: [hits, hits_alone], occluded: [occluded, occluded_alone] }
+}
+
+#[test]
+fn packets_that_do_not_belong_to_a_beam_leave_it_to_the_others() {
+    let ceiling = of_triangles((0..400).map(|i| {
+        let corner = Vec3::new((i % 20) as f32 - 10.0, 10.0, (i / 20) as f32 - 10.0) * 0.1;
+        [corner, corner + Vec3::X * 0.05, corner + Vec3::Z * 0.05]
+    }));
+    let eye = Vec3::new(0.1, 0.2, 0.3);
+    for strange in 0..=16 {
+        // Packets that start elsewhere, look back, or look aside, spread over the tile.
+        let rays: Vec<Ray> = (0..256u32)
+            .map(|i| {
+                let (packet, lane) = (i / 16, i % 16);
+                let slope = Vec3::new(packet as f32 * 0.02 - 0.15, 1.0, lane as f32 * 0.02 - 0.15);
+                match (packet * 11 + 9) % 16 {
+                    place if place >= strange => Ray::new(eye, slope),
+                    place if place % 3 == 0 => Ray::new(eye + Vec3::X * 0.3, slope),
+                    place if place % 3 == 1 => Ray::new(eye, -slope),
+                    _ => Ray::new(eye, Vec3::new(slope.y, slope.x, slope.z)),
+                }
+            })
+            .collect();
+        let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+        for isa in Isa::available() {
+            let accel = Accel::build(&ceiling, &BuildParams::default()).expect("builds").with_isa(isa);
+            let TogetherAndAlone { beams, hits, occluded } = together_and_alone(&accel, &packets);
+            for packet in 0..16 {
+                for lane in 0..16 {
+                    let [together, alone] = [0, 1].map(|way: usize| hits[way][packet].get(lane));
+                    assert_eq!(together, alone, "{strange} on {isa}: packet {packet}, lane {lane}");
+                }
+            }
+            assert_eq!(occluded[0], occluded[1], "{strange} on {isa}");
+            assert!(occluded[0].iter().any(|&lanes| lanes != 0), "some hit");
+            if strange <= 4 {
+                assert_eq!(beams, 1, "{strange} on {isa}");
+            } else if strange >= 12 {
+                assert_eq!(beams, 0, "{strange} on {isa}");
+            }
+        }
+    }
 }

@@ -22,6 +22,8 @@ mod directory;
 mod epoch;
 #[path = "../../src/cache/gate.rs"]
 mod gate;
+#[path = "../../src/cache/known.rs"]
+mod known;
 #[path = "../../src/cache/layout.rs"]
 mod layout;
 #[path = "../../src/cache/plan.rs"]
@@ -58,13 +60,14 @@ use std::env;
 use std::time::Instant;
 
 /// What is tried, and in how many schedules.
-const CHECKS: [(&str, fn(), usize); 8] = [
+const CHECKS: [(&str, fn(), usize); 9] = [
     ("blocks are whole for as long as they are read", scenes::blocks_are_whole, 1500),
     ("the same in sets of one block", scenes::sets_of_one, 1500),
     ("a block may be asked for while it goes", scenes::asked_for_again, 6000),
     ("nobody waits for ever for a block that failed", scenes::a_failure_ends, 1500),
     ("a deadline leaves nothing behind", scenes::a_deadline, 6000),
     ("what is retired is freed when nobody reads it", scenes::epochs_hold, 3000),
+    ("what is known to be here can be read", scenes::known_lists_hold, 6000),
     ("the gate lets in as many as there are places", scenes::the_gate_holds, 3000),
     ("a quota comes to all who want some of it", scenes::the_quota_comes_round, 3000),
 ];

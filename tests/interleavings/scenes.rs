@@ -5,6 +5,7 @@ use crate::directory::Shape;
 use crate::epoch::Epochs;
 use crate::error::{Error, Result};
 use crate::gate::Gate;
+use crate::known::Known;
 use crate::layout::{Array, Layout};
 use crate::plan::{CacheOptions, Loading, Plan};
 use crate::policy::Replacement;
@@ -164,6 +165,39 @@ pub fn epochs_hold() {
                 for _ in 0..2 {
                     reader.enter();
                     if here.load(Ordering::SeqCst) {
+                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
+                        thread::yield_now();
+                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
+                    }
+                    reader.leave();
+                }
+            })
+        })
+        .collect();
+    here.store(false, Ordering::SeqCst);
+    let retired = epochs.retire();
+    while epochs.earliest() <= retired {
+        thread::yield_now();
+    }
+    freed.store(true, Ordering::SeqCst);
+    readers.into_iter().for_each(|reader| reader.join().expect("no panic"));
+}
+
+pub fn known_lists_hold() {
+    // The same, found by readers who look once and keep in mind what they saw.
+    let epochs = Epochs::new(4);
+    let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
+    let readers: Vec<_> = (0..2)
+        .map(|_| {
+            let (reader, here, freed) =
+                (epochs.reader().expect("room"), Arc::clone(&here), Arc::clone(&freed));
+            thread::spawn(move || {
+                let known = Known::new();
+                for _ in 0..3 {
+                    let epoch = reader.enter();
+                    let is_known = known.has(1, epoch, 0);
+                    if is_known || here.load(Ordering::SeqCst) {
+                        known.add(1, epoch, 0);
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
                         thread::yield_now();
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");

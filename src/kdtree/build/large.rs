@@ -12,6 +12,7 @@ use super::subtree::{self, Subtree};
 use super::{Built, Context, Place, Verdict};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
+use crate::huge;
 use crate::kdtree::memory::{Ledger, bytes_of};
 use crate::kdtree::node::Node;
 use crate::kdtree::params::{BuildParams, MOST_BINS};
@@ -237,7 +238,7 @@ impl Part {
     /// The whole tree in two arrays: the root, an unused place, so that pairs of siblings are aligned,
     /// and then the pairs.
     pub fn gathered(self, ledger: &Ledger) -> Built {
-        let mut nodes = vec![Node::leaf(0, 0); 2 + self.nodes()];
+        let mut nodes = huge::copies_of(Node::leaf(0, 0), 2 + self.nodes());
         let mut references = vec![0; self.references()];
         ledger.add(bytes_of(&nodes) + bytes_of(&references));
         let bytes = self.bytes();

@@ -22,6 +22,10 @@ pub enum Form {
 const STRAY: f32 = 1.0 / (1 << 20) as f32;
 const STRAY_OF_PLACE: f32 = 1.0 / (1 << 22) as f32;
 
+/// So many packets may not belong to a beam: a tile at the edge of something, whose shadow rays part from places far
+/// behind one another, has some that point elsewhere. Tiles with more are no beams.
+const MISFITS: u32 = 6;
+
 /// The least squared sine of an angle between two rays that tells where they meet.
 const NARROWEST: f64 = 1e-12;
 
@@ -63,20 +67,23 @@ fn direction<const W: usize>(rays: &RayPacket<W>, lane: usize) -> [f32; 3] {
     [rays.direction[0][lane], rays.direction[1][lane], rays.direction[2][lane]]
 }
 
-/// The form that rays have if they have any, and its frame.
+/// The form that rays have if they have any, and its frame, about the way that the packet in the middle goes.
 #[inline(always)]
 pub fn guess(rays: &[RayPacket<16>], active: &[u32; PACKETS]) -> Option<(Form, Frame)> {
     let first = (0..rays.len()).find(|&packet| active[packet] != 0)?;
     let last = (0..rays.len()).rfind(|&packet| active[packet] != 0)?;
     let (lane, other) = (first_lane(active, first)?, 31 - (active[last] & 0xffff).leading_zeros() as usize);
     let (o, d) = (origin(&rays[first], lane), direction(&rays[first], lane));
+    let middle = ((first + last) / 2) & 15;
+    let middle = if active[middle] != 0 { middle } else { first };
+    let way = direction(&rays[middle], first_lane(active, middle)?);
     if o == origin(&rays[last], other) {
-        return Some((Form::From, Frame::new(o, d)));
+        return Some((Form::From, Frame::new(o, way)));
     }
     if d == direction(&rays[last], other) {
         return Some((Form::Along, Frame::new(o, d)));
     }
-    Some((Form::Toward, Frame::new(meeting(rays, active, first)?, d.map(|x| -x))))
+    Some((Form::Toward, Frame::new(meeting(rays, active, first)?, way.map(|x| -x))))
 }
 
 /// Where rays meet, if they do: where the first comes nearest to that one of all packets' first rays
@@ -102,15 +109,17 @@ fn meeting(rays: &[RayPacket<16>], active: &[u32; PACKETS], first: usize) -> Opt
     found
 }
 
-/// The packets' extents if the rays are a beam from its apex. `None` if they are none: if origins differ,
-/// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin.
+/// The packets' extents if the rays are a beam from its apex. A packet does not belong to it if origins differ,
+/// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin: it is taken out of
+/// `active`. `None` if there are more than [`MISFITS`] of these.
 #[inline(always)]
 pub fn from_apex<L: Sixteen>(
     frame: &Frame,
     rays: &[RayPacket<16>],
-    active: &[u32; PACKETS],
+    active: &mut [u32; PACKETS],
 ) -> Option<Extent<L>> {
     let mut extents = Extents::new();
+    let mut misfits = 0;
     for (packet, rays) in rays.iter().enumerate() {
         let lanes = active[packet];
         if lanes == 0 {
@@ -129,7 +138,12 @@ pub fn from_apex<L: Sixteen>(
         ];
         belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
         if belongs.bits() & lanes != lanes {
-            return None;
+            active[packet] = 0;
+            misfits += 1;
+            if misfits > MISFITS {
+                return None;
+            }
+            continue;
         }
         extents.set(packet, lanes, slopes, tnear * forward, tfar * forward);
     }
@@ -137,13 +151,13 @@ pub fn from_apex<L: Sixteen>(
 }
 
 /// The packets' extents, what each ray looks like, and how far rays are off, if they are a beam of some
-/// form. `None` if they are none.
+/// form. Packets that do not belong to it are taken out of `active`; `None` if there are more than [`MISFITS`].
 #[inline(always)]
 pub fn of_form<L: Sixteen>(
     form: Form,
     frame: &Frame,
     rays: &[RayPacket<16>],
-    active: &[u32; PACKETS],
+    active: &mut [u32; PACKETS],
     seen: &mut Seen,
 ) -> Option<(Extent<L>, Spread)> {
     let zero = L::splat(0.0);
@@ -153,6 +167,7 @@ pub fn of_form<L: Sixteen>(
     let mut extents = Extents::new();
     let mut range = zero;
     let mut first_direction = None;
+    let mut misfits = 0;
     for (packet, rays) in rays.iter().enumerate() {
         let lanes = active[packet];
         if lanes == 0 {
@@ -195,7 +210,12 @@ pub fn of_form<L: Sixteen>(
             }
         }
         if belongs.bits() & lanes != lanes {
-            return None;
+            active[packet] = 0;
+            misfits += 1;
+            if misfits > MISFITS {
+                return None;
+            }
+            continue;
         }
         let counts = L::mask_from_bits(lanes);
         range = range.max(L::select(counts, o[0].abs().max(o[1].abs()).max(o[2].abs()), zero));

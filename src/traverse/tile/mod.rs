@@ -45,7 +45,7 @@ use shadow::Shadows;
 const FEW: u32 = 1;
 
 /// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
-/// `false`, and nothing done, if the rays are no beam from one point.
+/// Gives the packets that this is done for, a bit for each: none if the rays are no beam from one point.
 #[inline(always)]
 pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
@@ -53,7 +53,7 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> bool {
+) -> u32 {
     if S::NATIVE == 16 {
         nearest::<S::F16, S::F16, T, M, P, 16, 1>(tree, rays, active, hits, probe)
     } else {
@@ -61,8 +61,8 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     }
 }
 
-/// The lanes in `active` that hit anything, packet by packet. `false`, and nothing done, if the rays
-/// are no beam.
+/// The lanes in `active` that hit anything, packet by packet. Gives the packets that this is done for, a bit for
+/// each: none if the rays are no beam.
 #[inline(always)]
 pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
@@ -70,7 +70,7 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     active: &[u32; PACKETS],
     found: &mut [u32],
     probe: &mut P,
-) -> bool {
+) -> u32 {
     if S::NATIVE == 16 {
         shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, active, found, probe)
     } else {
@@ -86,19 +86,20 @@ fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> bool {
+) -> u32 {
     if !tree.scale().is_none() {
-        return false;
+        return 0;
     }
-    let Some((Form::From, frame)) = form::guess(rays, active) else { return false };
-    let Some(extent) = form::from_apex::<L>(&frame, rays, active) else { return false };
+    let Some((Form::From, frame)) = form::guess(rays, active) else { return 0 };
+    let mut belong = *active;
+    let Some(extent) = form::from_apex::<L>(&frame, rays, &mut belong) else { return 0 };
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
-    let mut bundle = Nearest::<L, R, T, M, N, PARTS>::new(tree, rays, active, &beam);
+    let mut bundle = Nearest::<L, R, T, M, N, PARTS>::new(tree, rays, &belong, &beam);
     Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
     for (packet, hits) in hits.iter_mut().enumerate() {
         bundle.give(packet, hits);
     }
-    true
+    same(active, &belong)
 }
 
 /// [`occluded`] with `N` rays to a register.
@@ -109,16 +110,17 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     active: &[u32; PACKETS],
     found: &mut [u32],
     probe: &mut P,
-) -> bool {
+) -> u32 {
     if !tree.scale().is_none() {
-        return false;
+        return 0;
     }
-    let Some((form, frame)) = form::guess(rays, active) else { return false };
+    let Some((form, frame)) = form::guess(rays, active) else { return 0 };
     let mut seen = Seen::new();
-    let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, active, &mut seen) else {
-        return false;
+    let mut belong = *active;
+    let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, &mut belong, &mut seen) else {
+        return 0;
     };
-    let trace = Trace { tree, rays, active, frame, extent, spread };
+    let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
     let open = if form == Form::Along {
         trace.shadows::<R, M, P, N, true>(&mut seen, probe)
     } else {
@@ -127,7 +129,17 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     for ((found, open), active) in found.iter_mut().zip(open).zip(active) {
         *found = active & !open;
     }
-    true
+    same(active, &belong)
+}
+
+/// The packets whose lanes are the same in both.
+#[inline(always)]
+fn same(active: &[u32; PACKETS], belong: &[u32; PACKETS]) -> u32 {
+    let mut same = 0;
+    for packet in 0..PACKETS {
+        same |= u32::from(active[packet] == belong[packet]) << packet;
+    }
+    same
 }
 
 /// Rays that are known to be a beam.
