@@ -249,10 +249,12 @@ impl Accel {
     pub fn intersect_tile(&self, rays: &[RayPacket<16>], active: &[u32], hits: &mut [HitPacket<16>]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         let lanes = tile_lanes(rays, active);
-        let done = self.ask(IntersectTile { rays, active: &lanes, hits: &mut *hits });
-        for (packet, ((rays, active), hits)) in rays.iter().zip(lanes).zip(hits).enumerate() {
-            if done >> packet & 1 == 0 {
-                *hits = self.intersect_packet(rays, active);
+        let left = self.ask(IntersectTile { rays, active: &lanes, hits: &mut *hits });
+        for (((rays, active), left), hits) in rays.iter().zip(lanes).zip(left).zip(hits) {
+            if active == 0 {
+                *hits = HitPacket::miss();
+            } else if left != 0 {
+                *hits = self.intersect_packet(rays, left);
             }
         }
     }
@@ -261,11 +263,12 @@ impl Accel {
     /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode. Panics if the scene is not all
     /// in memory.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
-        let query = CountTile { rays, active: &tile_lanes(rays, active), any_hit, counts: &mut *counts };
+        let lanes = tile_lanes(rays, active);
+        let query = CountTile { rays, active: &lanes, any_hit, counts: &mut *counts };
         let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
-        let done = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
-        counts.beams += u64::from(done != 0);
+        let left = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
+        counts.beams += u64::from(left != lanes);
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet. Rays go
@@ -274,10 +277,12 @@ impl Accel {
     pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         let lanes = tile_lanes(rays, active);
-        let done = self.ask(OccludedTile { rays, active: &lanes, found: &mut *occluded });
-        for (packet, ((rays, active), occluded)) in rays.iter().zip(lanes).zip(occluded).enumerate() {
-            if done >> packet & 1 == 0 {
-                *occluded = self.occluded_packet(rays, active);
+        let left = self.ask(OccludedTile { rays, active: &lanes, found: &mut *occluded });
+        for (((rays, active), left), occluded) in rays.iter().zip(lanes).zip(left).zip(occluded) {
+            if active == 0 {
+                *occluded = 0;
+            } else if left != 0 {
+                *occluded = self.occluded_packet(rays, left);
             }
         }
     }

@@ -78,7 +78,7 @@ where
     }
 }
 
-/// The closest hits of a tile's packets, of those that are a beam; which these are.
+/// The closest hits of a tile's packets that are part of a beam; the lanes of the others.
 pub struct IntersectTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -86,16 +86,16 @@ pub struct IntersectTile<'a> {
 }
 
 impl Query for IntersectTile<'_> {
-    type Output = u32;
+    type Output = [u32; PACKETS];
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> [u32; PACKETS] {
         let Self { rays, active, hits } = self;
         tile::intersect::<S, _, M, _>(tree, rays, active, hits, &mut ())
     }
 }
 
-/// The lanes of a tile that hit anything, in the packets that are a beam; which these are.
+/// The lanes of a tile that hit anything, in the packets that are part of a beam; the lanes of the others.
 pub struct OccludedTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -103,16 +103,16 @@ pub struct OccludedTile<'a> {
 }
 
 impl Query for OccludedTile<'_> {
-    type Output = u32;
+    type Output = [u32; PACKETS];
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> [u32; PACKETS] {
         let Self { rays, active, found } = self;
         tile::occluded::<S, _, M, _>(tree, rays, active, found, &mut ())
     }
 }
 
-/// What the tile kernel does with a tile; which of its packets are a beam.
+/// What the tile kernel does with a tile; the lanes of the packets that are part of no beam.
 pub struct CountTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -121,10 +121,10 @@ pub struct CountTile<'a> {
 }
 
 impl Query for CountTile<'_> {
-    type Output = u32;
+    type Output = [u32; PACKETS];
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> [u32; PACKETS] {
         let Self { rays, active, any_hit, counts } = self;
         if any_hit {
             let found = &mut [0; PACKETS][..rays.len()];

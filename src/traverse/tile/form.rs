@@ -22,9 +22,10 @@ pub enum Form {
 const STRAY: f32 = 1.0 / (1 << 20) as f32;
 const STRAY_OF_PLACE: f32 = 1.0 / (1 << 22) as f32;
 
-/// So many packets may not belong to a beam: a tile at the edge of something, whose shadow rays part from places far
-/// behind one another, has some that point elsewhere. Tiles with more are no beams.
-const MISFITS: u32 = 6;
+/// So many packets may not belong to a beam: a tile at the edge of something, or where a light's rays turn from running
+/// fastest along one axis to another, has some that point elsewhere. With more, rays are taken to have nothing in
+/// common, which shows soon.
+const MISFITS: u32 = 12;
 
 /// The least squared sine of an angle between two rays that tells where they meet.
 const NARROWEST: f64 = 1e-12;

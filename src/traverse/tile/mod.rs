@@ -6,7 +6,8 @@
 //! 2005; interval traversal: Boulos, Wald & Benthin 2008). In order:
 //!
 //! 1. `form`: the rays are made a beam (`beam`); that decides whether they are alike enough at all.
-//!    They are if they part from one point, run toward one, or are parallel.
+//!    They are if they part from one point, run toward one, or are parallel. Packets that point elsewhere than the
+//!    others make another beam.
 //! 2. `page`: the beam descends the *upper tree*, whose leaves are pages of some fifty triangles, near
 //!    cells first.
 //! 3. `outline`: of a page's triangles, sixteen at a time, those that no ray can hit are culled: first
@@ -44,8 +45,12 @@ use shadow::Shadows;
 /// So many packets, or fewer, go on alone.
 const FEW: u32 = 1;
 
-/// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses.
-/// Gives the packets that this is done for, a bit for each: none if the rays are no beam from one point.
+/// A tile may be so many beams, one after the other: where a light is near, its rays run fastest along different axes.
+const BEAMS: usize = 3;
+
+/// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses. Gives the lanes
+/// of packets that are part of no beam from one point: for them, and for packets of which no lane is active, nothing
+/// is done.
 #[inline(always)]
 pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
@@ -53,16 +58,23 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     active: &[u32; PACKETS],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> u32 {
-    if S::NATIVE == 16 {
-        nearest::<S::F16, S::F16, T, M, P, 16, 1>(tree, rays, active, hits, probe)
-    } else {
-        nearest::<S::F16, S::F8, T, M, P, 8, 2>(tree, rays, active, hits, probe)
+) -> [u32; PACKETS] {
+    let mut left = *active;
+    for _ in 0..BEAMS {
+        let done = if S::NATIVE == 16 {
+            nearest::<S::F16, S::F16, T, M, P, 16, 1>(tree, rays, &left, hits, probe)
+        } else {
+            nearest::<S::F16, S::F8, T, M, P, 8, 2>(tree, rays, &left, hits, probe)
+        };
+        if !take(&mut left, done) {
+            break;
+        }
     }
+    left
 }
 
-/// The lanes in `active` that hit anything, packet by packet. Gives the packets that this is done for, a bit for
-/// each: none if the rays are no beam.
+/// The lanes in `active` that hit anything, packet by packet. Gives the lanes of packets that are part of no beam: for
+/// them, and for packets of which no lane is active, nothing is done.
 #[inline(always)]
 pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
@@ -70,15 +82,35 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     active: &[u32; PACKETS],
     found: &mut [u32],
     probe: &mut P,
-) -> u32 {
-    if S::NATIVE == 16 {
-        shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, active, found, probe)
-    } else {
-        shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, active, found, probe)
+) -> [u32; PACKETS] {
+    let mut left = *active;
+    for _ in 0..BEAMS {
+        let done = if S::NATIVE == 16 {
+            shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, found, probe)
+        } else {
+            shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, found, probe)
+        };
+        if !take(&mut left, done) {
+            break;
+        }
     }
+    left
 }
 
-/// [`intersect`] with `N` rays to a register, and so packets in `PARTS` parts.
+/// Takes packets that are done out of those that are left; whether there may be another beam among these.
+#[inline(always)]
+fn take(left: &mut [u32; PACKETS], done: u32) -> bool {
+    let mut count = 0;
+    for packet in 0..PACKETS {
+        if done >> packet & 1 == 1 {
+            left[packet] = 0;
+        }
+        count += u32::from(left[packet] != 0);
+    }
+    done != 0 && count > FEW
+}
+
+/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which packets it was.
 #[inline(always)]
 fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize, const PARTS: usize>(
     tree: &T,
@@ -97,12 +129,14 @@ fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     let mut bundle = Nearest::<L, R, T, M, N, PARTS>::new(tree, rays, &belong, &beam);
     Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
     for (packet, hits) in hits.iter_mut().enumerate() {
-        bundle.give(packet, hits);
+        if belong[packet & 15] != 0 {
+            bundle.give(packet, hits);
+        }
     }
-    same(active, &belong)
+    there(&belong)
 }
 
-/// [`occluded`] with `N` rays to a register.
+/// A beam of [`occluded`], with `N` rays to a register; which packets it was.
 #[inline(always)]
 fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
@@ -126,20 +160,22 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     } else {
         trace.shadows::<R, M, P, N, false>(&mut seen, probe)
     };
-    for ((found, open), active) in found.iter_mut().zip(open).zip(active) {
-        *found = active & !open;
+    for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
+        if *belong != 0 {
+            *found = belong & !open;
+        }
     }
-    same(active, &belong)
+    there(&belong)
 }
 
-/// The packets whose lanes are the same in both.
+/// The packets of which a lane counts.
 #[inline(always)]
-fn same(active: &[u32; PACKETS], belong: &[u32; PACKETS]) -> u32 {
-    let mut same = 0;
+fn there(lanes: &[u32; PACKETS]) -> u32 {
+    let mut there = 0;
     for packet in 0..PACKETS {
-        same |= u32::from(active[packet] == belong[packet]) << packet;
+        there |= u32::from(lanes[packet] != 0) << packet;
     }
-    same
+    there
 }
 
 /// Rays that are known to be a beam.
