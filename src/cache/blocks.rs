@@ -30,8 +30,7 @@ const READ: usize = 4096;
 
 /// Squares of a picture that a tick is long. Every block's first use in a tick is written down, and lists are looked at
 /// anew ([`known`](super::known)): with a tick of one square, a view of which all was in memory ran at 0.58 to 0.67 of the
-/// resident scene's speed, with 16 at 0.70 to 0.82, with this at 0.82 to 0.92; where blocks had to go, it made no
-/// difference.
+/// resident scene's speed, with 16 at 0.83, with this at 0.87; where blocks had to go, it made no difference.
 const SESSIONS_PER_TICK: u32 = 64;
 
 /// Requests that wait for a loader.
