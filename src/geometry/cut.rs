@@ -9,7 +9,7 @@
 
 use super::Aabb;
 use super::triangle::Corners;
-use glam::{Vec4, Vec4Swizzles};
+use glam::{BVec4A, Vec4, Vec4Swizzles};
 
 /// How far a crossing may be off, as a part of the greater of its ends' coordinates. A difference of two floats
 /// is off by 2^-24 of itself, so the weight of a crossing is off by 4 · 2^-24 at most, the way between the ends
@@ -28,13 +28,13 @@ pub fn halves(corners: &Corners, within: &Aabb, axis: usize, position: f32) -> [
         let (start, end) = (from[axis], to[axis]);
         below.grow_if(start <= position, from, from);
         above.grow_if(start >= position, from, from);
-        // What overflows is no number, and leaves the box as it is.
-        let way = to - from;
-        let crossing = from + way * ((position - start) / (end - start));
+        let (way, length) = (to - from, end - start);
+        let crossing = from + way * ((position - start) / length);
         let slack = from.abs().max(to.abs()) * SLACK + Vec4::splat(f32::MIN_POSITIVE);
         let crosses = (start < position) != (end < position);
         let (low, high) = (crossing - slack, crossing + slack);
-        let known = crossing.is_finite_mask();
+        // What overflows, the length among it, says nothing: then the box stays as it is.
+        let known = crossing.is_finite_mask() & BVec4A::splat(length.is_finite());
         let low = Vec4::select(known, low, Vec4::NEG_INFINITY);
         let high = Vec4::select(known, high, Vec4::INFINITY);
         below.grow_if(crosses, low, high);
@@ -57,7 +57,7 @@ impl Range {
     /// Takes in a box if it is to; without a branch, for nobody could foresee it.
     #[inline(always)]
     fn grow_if(&mut self, wanted: bool, low: Vec4, high: Vec4) {
-        let wanted = glam::BVec4A::splat(wanted);
+        let wanted = BVec4A::splat(wanted);
         self.low = self.low.min(Vec4::select(wanted, low, Vec4::INFINITY));
         self.high = self.high.max(Vec4::select(wanted, high, Vec4::NEG_INFINITY));
     }
@@ -110,6 +110,10 @@ mod tests {
         let corners = [[-3e38, -3e38, 0.0], [3e38, 3e38, 0.0], [3e38, 3e38, 1.0]];
         let within = Aabb { min: Vec3::new(-3e38, -3e38, 0.0), max: Vec3::new(3e38, 3e38, 1.0) };
         assert_eq!(halves(&corners, &within, 0, 1e38), within.halves(0, 1e38).map(Some));
+        // The length alone overflows.
+        let corners = [[-3e38, -1.0, 0.0], [3e38, 1.0, 0.0], [3e38, 1.0, 1.0]];
+        let within = Aabb::of_points(corners.map(Vec3::from));
+        check(&corners, &within, 0, 1e38);
     }
 
     proptest! {

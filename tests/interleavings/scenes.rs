@@ -154,37 +154,16 @@ pub fn a_deadline() {
 }
 
 pub fn epochs_hold() {
-    // Something that is there, declared gone, retired and freed, and two readers that may have found it.
-    let epochs = Epochs::new(4);
-    let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
-    let readers: Vec<_> = (0..2)
-        .map(|_| {
-            let (reader, here, freed) =
-                (epochs.reader().expect("room"), Arc::clone(&here), Arc::clone(&freed));
-            thread::spawn(move || {
-                for _ in 0..2 {
-                    reader.enter();
-                    if here.load(Ordering::SeqCst) {
-                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
-                        thread::yield_now();
-                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
-                    }
-                    reader.leave();
-                }
-            })
-        })
-        .collect();
-    here.store(false, Ordering::SeqCst);
-    let retired = epochs.retire();
-    while epochs.earliest() <= retired {
-        thread::yield_now();
-    }
-    freed.store(true, Ordering::SeqCst);
-    readers.into_iter().for_each(|reader| reader.join().expect("no panic"));
+    goes_while_it_is_read(false);
 }
 
 pub fn known_lists_hold() {
-    // The same, found by readers who look once and keep in mind what they saw.
+    goes_while_it_is_read(true);
+}
+
+/// Something that is there, declared gone, retired and freed, and two readers that may have found it; they may keep
+/// in mind what they saw.
+fn goes_while_it_is_read(keep_in_mind: bool) {
     let epochs = Epochs::new(4);
     let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
     let readers: Vec<_> = (0..2)
@@ -193,11 +172,12 @@ pub fn known_lists_hold() {
                 (epochs.reader().expect("room"), Arc::clone(&here), Arc::clone(&freed));
             thread::spawn(move || {
                 let known = Known::new();
-                for _ in 0..3 {
+                for _ in 0..2 + usize::from(keep_in_mind) {
                     let epoch = reader.enter();
-                    let is_known = known.has(1, epoch, 0);
-                    if is_known || here.load(Ordering::SeqCst) {
-                        known.add(1, epoch, 0);
+                    if known.has(1, epoch, 0) || here.load(Ordering::SeqCst) {
+                        if keep_in_mind {
+                            known.add(1, epoch, 0);
+                        }
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
                         thread::yield_now();
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");

@@ -139,11 +139,7 @@ pub fn from_apex<L: Sixteen>(
         ];
         belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
         if belongs.bits() & lanes != lanes {
-            active[packet] = 0;
-            misfits += 1;
-            if misfits > MISFITS {
-                return None;
-            }
+            leave_out(&mut active[packet], &mut misfits)?;
             continue;
         }
         extents.set(packet, lanes, slopes, tnear * forward, tfar * forward);
@@ -211,11 +207,7 @@ pub fn of_form<L: Sixteen>(
             }
         }
         if belongs.bits() & lanes != lanes {
-            active[packet] = 0;
-            misfits += 1;
-            if misfits > MISFITS {
-                return None;
-            }
+            leave_out(&mut active[packet], &mut misfits)?;
             continue;
         }
         let counts = L::mask_from_bits(lanes);
@@ -231,6 +223,14 @@ pub fn of_form<L: Sixteen>(
     let range = range.greatest();
     let stray = if form == Form::Toward { range * STRAY + place * STRAY_OF_PLACE } else { 0.0 };
     Some((extents.finish(range), Spread { range, stray }))
+}
+
+/// Takes a packet out that does not belong. `None` if there are too many.
+#[inline(always)]
+fn leave_out(lanes: &mut u32, misfits: &mut u32) -> Option<()> {
+    *lanes = 0;
+    *misfits += 1;
+    (*misfits <= MISFITS).then_some(())
 }
 
 /// The lanes whose rays are ordinary: their speed forward, which is the direction's greatest component,
