@@ -111,9 +111,9 @@ mod tests {
         let within = Aabb { min: Vec3::new(-3e38, -3e38, 0.0), max: Vec3::new(3e38, 3e38, 1.0) };
         assert_eq!(halves(&corners, &within, 0, 1e38), within.halves(0, 1e38).map(Some));
         // The length alone overflows.
-        let corners = [[-3e38, -1.0, 0.0], [3e38, 1.0, 0.0], [3e38, 1.0, 1.0]];
+        let corners = [[-3e38, -1.0, 0.0], [3e38, 1.0, 0.0], [3e38, -1.0, 1.0]];
         let within = Aabb::of_points(corners.map(Vec3::from));
-        check(&corners, &within, 0, 1e38);
+        check(&corners, &within, 0, 0.0);
     }
 
     proptest! {
