@@ -81,13 +81,11 @@ pub fn srgb_to_linear(byte: u8) -> f32 {
     LINEAR[byte as usize]
 }
 
-/// The nearest sRGB-encoded byte to an amount of light; what lies outside 0 to 1 is clamped, and
-/// NaN is 0.
+/// The sRGB-encoded byte for an amount of light, at most 0.55 of a step away; what lies outside 0 to 1 is clamped,
+/// and NaN is 0.
 #[inline]
 pub fn linear_to_srgb(light: f32) -> u8 {
-    let s = if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-    // The cast saturates, and takes NaN to 0.
-    (s * 255.0 + 0.5) as u8
+    fast_srgb8::f32_to_srgb8(light)
 }
 
 /// The colour between three corners, blended in linear light as `(1 - u - v) c0 + u c1 + v c2`.

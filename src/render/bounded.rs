@@ -82,14 +82,9 @@ impl StandIn<'_> {
                 let ray = self.view.ray(tile.x + x, tile.y + y, [0.5, 0.5]);
                 let entry = first_page(self.cached, &ray);
                 let shade = shader.stand_in(&ray, entry);
-                let index = (y * tile.width + x) as usize;
-                pixels.color[index] = shade.base.to_array();
-                if let Some(depth) = pixels.depth.get_mut(index) {
-                    *depth = shade.depth;
-                }
-                if let Some(normal) = pixels.normal.get_mut(index) {
-                    *normal = shade.normal.to_array();
-                }
+                pixels.color.put(x, y, shade.base.to_array());
+                pixels.depth.put(x, y, shade.depth);
+                pixels.normal.put(x, y, shade.normal.to_array());
             }
         }
         scratch.stand_ins += count;

@@ -1,4 +1,4 @@
-//! Pictures in memory: tile by tile while they are made, row by row when done.
+//! Pictures in memory, and the parts of them that tiles write to.
 
 use super::order::Tile;
 use super::settings::{Aovs, Size};
@@ -16,85 +16,98 @@ pub struct Frame {
     pub normal: Option<Vec<[f32; 3]>>,
 }
 
-/// A picture in the making: the tiles' pixels one tile after the other, so that each worker
-/// writes to memory of its own, and no two share a cache line but at a tile's ends.
-pub(super) struct TiledFrame {
-    color: Vec<[f32; 3]>,
-    depth: Option<Vec<f32>>,
-    normal: Option<Vec<[f32; 3]>>,
-}
-
-/// A tile and the memory for its pixels, in rows.
+/// A tile and the memory for its pixels.
 pub(super) struct TilePixels<'a> {
     pub tile: Tile,
-    pub color: &'a mut [[f32; 3]],
-    /// Empty if not wanted.
-    pub depth: &'a mut [f32],
-    /// Empty if not wanted.
-    pub normal: &'a mut [[f32; 3]],
+    pub color: Rows<'a, [f32; 3]>,
+    pub depth: Rows<'a, f32>,
+    pub normal: Rows<'a, [f32; 3]>,
 }
 
-impl TiledFrame {
+/// A tile's part of a picture, row by row; none if the picture is not wanted.
+///
+/// Tiles write where their pixels belong, so that nothing has to be put together afterwards. Two of them share a cache
+/// line at most where one's row ends and the other's begins.
+pub(super) struct Rows<'a, T>(Vec<&'a mut [T]>);
+
+impl<T> Rows<'_, T> {
+    /// Whether there is anything to be put.
+    #[inline]
+    pub fn is_wanted(&self) -> bool {
+        !self.0.is_empty()
+    }
+
+    /// The pixels of a row from `x` on, if they are wanted. Panics if the tile has no such place.
+    #[inline(always)]
+    pub fn part(&mut self, x: u32, y: u32) -> Option<&mut [T]> {
+        self.0.get_mut(y as usize).map(|row| &mut row[x as usize..])
+    }
+
+    /// Puts a pixel to its place in the tile, if it is wanted. Panics if the tile has no such place.
+    #[inline(always)]
+    pub fn put(&mut self, x: u32, y: u32, value: T) {
+        if self.is_wanted() {
+            self.0[y as usize][x as usize] = value;
+        }
+    }
+}
+
+impl Frame {
     /// A black picture.
-    pub fn new(size: Size, aovs: Aovs) -> Self {
+    pub(super) fn black(size: Size, aovs: Aovs) -> Self {
         let pixels = size.pixels() as usize;
         Self {
+            size,
             color: vec![[0.0; 3]; pixels],
             depth: aovs.depth.then(|| vec![0.0; pixels]),
             normal: aovs.normal.then(|| vec![[0.0; 3]; pixels]),
         }
     }
 
-    /// Hands out each tile's memory. `tiles` must cover the picture.
-    pub fn split<'a>(&'a mut self, tiles: &[Tile]) -> Vec<TilePixels<'a>> {
-        let mut color = self.color.as_mut_slice();
-        let mut depth = self.depth.as_deref_mut().unwrap_or_default();
-        let mut normal = self.normal.as_deref_mut().unwrap_or_default();
-        tiles
-            .iter()
-            .map(|&tile| {
-                let pixels = tile.pixels();
-                TilePixels {
-                    tile,
-                    color: take(&mut color, pixels),
-                    depth: take(&mut depth, pixels),
-                    normal: take(&mut normal, pixels),
-                }
-            })
-            .collect()
-    }
-
-    /// The same picture row by row. `tiles` must be those that it was split into.
-    pub fn assemble(&self, size: Size, tiles: &[Tile]) -> Frame {
-        Frame {
-            size,
-            color: in_rows(&self.color, size, tiles),
-            depth: self.depth.as_ref().map(|depth| in_rows(depth, size, tiles)),
-            normal: self.normal.as_ref().map(|normal| in_rows(normal, size, tiles)),
-        }
+    /// Hands out each tile's memory. `tiles` must be those of a picture of this size, cut into squares of `side`.
+    pub(super) fn split<'a>(&'a mut self, tiles: &[Tile], side: u32) -> Vec<TilePixels<'a>> {
+        let grid = Grid::new(self.size, tiles, side);
+        let color = grid.rows(&mut self.color, tiles);
+        let depth = grid.rows(self.depth.as_deref_mut().unwrap_or_default(), tiles);
+        let normal = grid.rows(self.normal.as_deref_mut().unwrap_or_default(), tiles);
+        let channels = color.into_iter().zip(depth).zip(normal);
+        let jobs = tiles.iter().zip(channels);
+        jobs.map(|(&tile, ((color, depth), normal))| TilePixels { tile, color, depth, normal }).collect()
     }
 }
 
-/// Cuts `count` items off the front, or nothing if there are none.
-fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let all = std::mem::take(rest);
-    let (front, back) = all.split_at_mut(count.min(all.len()));
-    *rest = back;
-    front
+/// Which tile is where.
+struct Grid {
+    /// Side of a tile, and width of the picture, in pixels.
+    side: usize,
+    width: usize,
+    columns: usize,
+    /// The tile's number, by its place, row by row.
+    number: Vec<usize>,
 }
 
-fn in_rows<T: Copy + Default>(tiled: &[T], size: Size, tiles: &[Tile]) -> Vec<T> {
-    let mut rows = vec![T::default(); tiled.len()];
-    let mut rest = tiled;
-    for tile in tiles {
-        let (pixels, others) = rest.split_at(tile.pixels());
-        for (y, line) in pixels.chunks_exact(tile.width as usize).enumerate() {
-            let start = (tile.y as usize + y) * size.width as usize + tile.x as usize;
-            rows[start..start + line.len()].copy_from_slice(line);
+impl Grid {
+    fn new(size: Size, tiles: &[Tile], side: u32) -> Self {
+        let columns = size.width.div_ceil(side);
+        let mut number = vec![0; tiles.len()];
+        for (i, tile) in tiles.iter().enumerate() {
+            number[(tile.y / side * columns + tile.x / side) as usize] = i;
         }
-        rest = others;
+        Self { side: side as usize, width: size.width as usize, columns: columns as usize, number }
     }
-    rows
+
+    /// The rows of each tile.
+    fn rows<'a, T>(&self, pixels: &'a mut [T], tiles: &[Tile]) -> Vec<Rows<'a, T>> {
+        let height = if pixels.is_empty() { 0 } else { self.side };
+        let mut rows: Vec<Rows<'a, T>> = tiles.iter().map(|_| Rows(Vec::with_capacity(height))).collect();
+        for (y, line) in pixels.chunks_exact_mut(self.width).enumerate() {
+            let first = y / self.side * self.columns;
+            for (part, &number) in line.chunks_mut(self.side).zip(&self.number[first..]) {
+                rows[number].0.push(part);
+            }
+        }
+        rows
+    }
 }
 
 #[cfg(test)]
@@ -106,21 +119,24 @@ mod tests {
     fn pixels_come_to_where_their_tiles_are() {
         let size = Size { width: 13, height: 7 };
         let tiles = tiles(size.width, size.height, 4);
-        let mut tiled = TiledFrame::new(size, Aovs { depth: true, normal: false });
-        for job in tiled.split(&tiles) {
-            assert!(job.normal.is_empty());
-            for i in 0..job.tile.pixels() as u32 {
-                let (x, y) = (job.tile.x + i % job.tile.width, job.tile.y + i / job.tile.width);
-                job.color[i as usize] = [x as f32, y as f32, 0.0];
-                job.depth[i as usize] = (y * 13 + x) as f32;
+        for aovs in [Aovs { depth: true, normal: false }, Aovs { depth: false, normal: true }] {
+            let mut frame = Frame::black(size, aovs);
+            for mut pixels in frame.split(&tiles, 4) {
+                assert_eq!((pixels.depth.is_wanted(), pixels.normal.is_wanted()), (aovs.depth, aovs.normal));
+                let tile = pixels.tile;
+                for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+                    let [column, row] = [tile.x + x, tile.y + y].map(|place| place as f32);
+                    pixels.color.put(x, y, [column, row, 0.0]);
+                    pixels.depth.put(x, y, row * 13.0 + column);
+                    pixels.normal.put(x, y, [0.0, row, column]);
+                }
             }
+            for (i, color) in frame.color.iter().enumerate() {
+                assert_eq!(*color, [(i % 13) as f32, (i / 13) as f32, 0.0]);
+            }
+            assert_eq!(frame.depth, aovs.depth.then(|| (0..13 * 7).map(|i| i as f32).collect()));
+            let normal = |i: usize| [0.0, (i / 13) as f32, (i % 13) as f32];
+            assert_eq!(frame.normal, aovs.normal.then(|| (0..13 * 7).map(normal).collect()));
         }
-        let frame = tiled.assemble(size, &tiles);
-        for (i, color) in frame.color.iter().enumerate() {
-            assert_eq!(*color, [(i % 13) as f32, (i / 13) as f32, 0.0]);
-        }
-        let expected: Vec<f32> = (0..13 * 7).map(|i| i as f32).collect();
-        assert_eq!(frame.depth, Some(expected));
-        assert_eq!(frame.normal, None);
     }
 }

@@ -126,8 +126,8 @@ fn write_rgb(
     let format = Format::of(path)?;
     write_whole(path, |out| match format {
         Format::Png => {
-            let bytes: Vec<u8> = pixels.iter().flat_map(|&p| to_bytes(p)).collect();
-            encode_png(out, size, &bytes, ExtendedColorType::Rgb8)
+            let bytes: Vec<[u8; 3]> = pixels.iter().map(|&p| to_bytes(p)).collect();
+            encode_png(out, size, bytes.as_flattened(), ExtendedColorType::Rgb8)
         }
         Format::Exr => encode_exr(out, size, pixels),
         Format::Pfm => encode_pfm(out, size, "PF", pixels),

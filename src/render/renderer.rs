@@ -2,7 +2,7 @@
 
 use super::bounded::{First, FirstStats, StandIn, StandInCost};
 use super::effects::{Appearance, EffectCosts, EffectScratch, EffectTask, Limits, Tallies};
-use super::frame::{Frame, TilePixels, TiledFrame};
+use super::frame::{Frame, TilePixels};
 use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
 use super::settings::RenderSettings;
@@ -219,7 +219,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             samples,
             stand_in: None,
         };
-        let mut tiled = TiledFrame::new(size, aovs);
+        let mut frame = Frame::black(size, aovs);
 
         let mut outcome = Outcome::default();
         let mut first = None;
@@ -230,26 +230,24 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 task.stand_in = Some(StandIn { cached, view, cost: &self.stand_in });
             }
         }
-        let jobs = self.jobs(&mut tiled);
+        let jobs = self.jobs(&mut frame);
         self.pass(&task, jobs, wanted, &mut outcome);
 
         if let (Some(cached), Some(_)) = (self.accel.cached(), wanted.limit) {
             let stand_ins: u64 = outcome.states.iter().map(|scratch| scratch.stand_ins).sum();
-            let frame = tiled.assemble(size, &self.tiles);
             let stand_ins = stand_ins as f64 / size.pixels() as f64;
             let seconds = start.elapsed().as_secs_f64();
-            first = Some(First { frame, stats: FirstStats { seconds, stand_ins } });
+            first = Some(First { frame: frame.clone(), stats: FirstStats { seconds, stand_ins } });
             cached.set_deadline(None);
             task.stand_in = None;
             let late: HashSet<(u32, u32)> =
                 outcome.states.iter().flat_map(|scratch| scratch.late.iter().copied()).collect();
-            let mut jobs = tiled.split(&self.tiles);
+            let mut jobs = frame.split(&self.tiles, tuning.tile);
             jobs.retain(|pixels| late.contains(&(pixels.tile.x, pixels.tile.y)));
             if !jobs.is_empty() {
                 self.pass(&task, jobs, wanted, &mut outcome);
             }
         }
-        let frame = tiled.assemble(size, &self.tiles);
         Drawn { first, frame, stats: self.stats(&outcome, threads, start.elapsed().as_secs_f64()) }
     }
 
@@ -271,9 +269,9 @@ impl<'a, S: Surface> Renderer<'a, S> {
         if let Some(cached) = self.accel.cached() {
             cached.begin_frame();
         }
-        let mut tiled = TiledFrame::new(size, aovs);
+        let mut frame = Frame::black(size, aovs);
         let outcome = self.workers().run(
-            self.jobs(&mut tiled),
+            self.jobs(&mut frame),
             || EffectScratch::new(self.learnt.take(), counted.is_some()),
             |scratch: &mut EffectScratch, pixels: TilePixels<'_>| {
                 task.render(scratch, pixels);
@@ -281,7 +279,6 @@ impl<'a, S: Surface> Renderer<'a, S> {
             },
         );
         outcome.states.iter().for_each(|scratch| self.learnt.put(scratch.waves.tracer.learnt()));
-        let frame = tiled.assemble(size, &self.tiles);
 
         let mut costs = Tallies::default();
         outcome.states.iter().for_each(|scratch| costs += scratch.waves.tallies);
@@ -308,10 +305,10 @@ impl<'a, S: Surface> Renderer<'a, S> {
     }
 
     /// A frame's tiles, in the order in which they are to be begun.
-    fn jobs<'t>(&self, tiled: &'t mut TiledFrame) -> Vec<TilePixels<'t>> {
+    fn jobs<'f>(&self, frame: &'f mut Frame) -> Vec<TilePixels<'f>> {
         // What the last frame has used last is there still: this one begins with it.
         let backwards = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some();
-        let mut jobs = tiled.split(&self.tiles);
+        let mut jobs = frame.split(&self.tiles, self.settings.tuning.tile);
         if backwards {
             jobs.reverse();
         }

@@ -2,14 +2,15 @@
 
 use super::bounded::StandIn;
 use super::frame::TilePixels;
+use super::matt::{AddKey, Found, Shades};
 use super::order::Tile;
 use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
 use crate::scene::{Look, Surface, View};
+use crate::simd::{Simd, Task};
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
-use glam::Vec3;
 use std::time::Instant;
 
 /// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
@@ -97,25 +98,24 @@ pub(super) struct TileTask<'a, S, const W: usize> {
     pub stand_in: Option<StandIn<'a>>,
 }
 
-/// One packet's pixels on their way through the stages.
-#[derive(Clone)]
-struct Block<const W: usize> {
+/// One packet's pixels.
+#[derive(Clone, Copy)]
+struct Block {
     /// The upper left pixel in the tile.
     x: u32,
     y: u32,
-    /// Light that a free shadow ray adds.
-    key: [Vec3; W],
-    /// Light of all samples so far.
-    sum: [Vec3; W],
 }
 
 /// What a worker keeps from tile to tile: room for a square, packet by packet, and its counts.
 pub(super) struct Scratch<const W: usize> {
-    blocks: Vec<Block<W>>,
+    blocks: Vec<Block>,
     /// A bit for each lane whose pixel is in the tile.
     active: Vec<u32>,
     rays: Vec<RayPacket<W>>,
     hits: Vec<HitPacket<W>>,
+    /// What one packet after the other hit.
+    found: Found<W>,
+    shades: Vec<Shades<W>>,
     /// A bit for each lane whose shadow ray matters.
     lit: Vec<u32>,
     shadows: Vec<RayPacket<W>>,
@@ -136,12 +136,13 @@ impl<const W: usize> Scratch<W> {
     /// Empty, with what has been learnt before about kernels.
     pub fn new(dispatch: Dispatch) -> Self {
         let count = BATCH / W;
-        let block = Block { x: 0, y: 0, key: [Vec3::ZERO; W], sum: [Vec3::ZERO; W] };
         Self {
-            blocks: vec![block; count],
+            blocks: vec![Block { x: 0, y: 0 }; count],
             active: vec![0; count],
             rays: vec![RayPacket::empty(); count],
             hits: vec![HitPacket::miss(); count],
+            found: Found::nothing(),
+            shades: vec![Shades::black(); count],
             lit: vec![0; count],
             shadows: vec![RayPacket::empty(); count],
             occluded: vec![0; count],
@@ -174,8 +175,8 @@ fn lanes_inside<const W: usize>(tile: &Tile, x: u32, y: u32) -> u32 {
 }
 
 /// The indices of the set bits.
-#[inline]
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+#[inline(always)]
+pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
         bits &= bits - 1;
@@ -243,25 +244,14 @@ where
         let lit = &scratch.lit[..used];
         let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
         (self.calls.occluded)(&mut scratch.dispatch, self.accel, rays, lit, occluded);
-        for ((block, lit), occluded) in scratch.blocks.iter_mut().zip(lit).zip(&scratch.occluded) {
-            for lane in lanes(lit & !occluded) {
-                block.sum[lane] += block.key[lane];
-            }
-        }
+        self.accel.chosen().run(AddKey { shades: &mut scratch.shades[..used], lit, occluded });
         scratch.shadow.rays += count(lit);
         scratch.shadow.time += start.elapsed(self.accel);
     }
 
     /// Makes the rays through a point of each pixel.
-    fn make_rays(&self, blocks: &[Block<W>], rays: &mut [RayPacket<W>], tile: &Tile, offset: [f32; 2]) {
-        // Lanes beyond the border get rays like the others: they cost nothing and are not traced.
-        let width = block_size(W).0;
-        for (block, rays) in blocks.iter().zip(rays) {
-            for lane in 0..W as u32 {
-                let (x, y) = (tile.x + block.x + lane % width, tile.y + block.y + lane / width);
-                rays.set(lane as usize, &self.view.ray(x, y, offset));
-            }
-        }
+    fn make_rays(&self, blocks: &[Block], rays: &mut [RayPacket<W>], tile: &Tile, offset: [f32; 2]) {
+        self.accel.chosen().run(CameraRays { view: &self.view, blocks, rays, tile, offset });
     }
 
     /// Shades a packet's hits and makes its shadow rays. The first sample also fills the depth and
@@ -274,36 +264,58 @@ where
         first: bool,
         pixels: &mut TilePixels<'_>,
     ) {
-        let block = &mut scratch.blocks[packet];
-        let (rays, hits) = (&scratch.rays[packet], &scratch.hits[packet]);
-        let mut lit = 0;
-        for lane in lanes(scratch.active[packet]) {
-            let shade = self.shader.shade(surfaces, &rays.get(lane), &hits.get(lane));
-            block.sum[lane] += shade.base;
-            if let Some(ray) = &shade.shadow {
-                scratch.shadows[packet].set(lane, ray);
-                block.key[lane] = shade.key;
-                lit |= 1 << lane;
-            }
-            if first {
-                let index = pixel_index::<W>(&pixels.tile, block.x, block.y, lane);
-                if let Some(depth) = pixels.depth.get_mut(index) {
-                    *depth = shade.depth;
-                }
-                if let Some(normal) = pixels.normal.get_mut(index) {
-                    *normal = shade.normal.to_array();
-                }
+        let (block, shades) = (scratch.blocks[packet], &mut scratch.shades[packet]);
+        let (rays, hits, active) = (&scratch.rays[packet], &scratch.hits[packet], scratch.active[packet]);
+        let out = (&mut scratch.found, &mut *shades, &mut scratch.shadows[packet]);
+        self.shader.shade(self.accel.chosen(), surfaces, (rays, hits, active), out);
+        scratch.lit[packet] = shades.lit;
+        if first && (pixels.depth.is_wanted() || pixels.normal.is_wanted()) {
+            for lane in lanes(active) {
+                let (x, y) = place_of::<W>(block.x, block.y, lane);
+                // Infinite, as `t` is, where nothing was hit.
+                pixels.depth.put(x, y, hits.t[lane] * rays.get(lane).direction.length());
+                pixels.normal.put(x, y, shades.normal.each_ref().map(|row| row[lane]));
             }
         }
-        scratch.lit[packet] = lit;
     }
 
     fn write(&self, scratch: &Scratch<W>, used: usize, pixels: &mut TilePixels<'_>) {
         let weight = 1.0 / self.samples as f32;
-        for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
-            for lane in lanes(active) {
-                let index = pixel_index::<W>(&pixels.tile, block.x, block.y, lane);
-                pixels.color[index] = (block.sum[lane] * weight).to_array();
+        let (width, height) = block_size(W);
+        for (Block { x, y }, shades) in scratch.blocks[..used].iter().zip(&scratch.shades) {
+            let [red, green, blue] = &shades.sum;
+            for row in 0..height.min(pixels.tile.height - y) {
+                let first = (row * width) as usize;
+                let to = pixels.color.part(*x, y + row).into_iter().flatten();
+                for (pixel, lane) in to.zip(first..first + width as usize) {
+                    *pixel = [red[lane], green[lane], blue[lane]].map(|light| light * weight);
+                }
+            }
+        }
+    }
+}
+
+/// Makes camera rays.
+struct CameraRays<'a, const W: usize> {
+    view: &'a View,
+    blocks: &'a [Block],
+    rays: &'a mut [RayPacket<W>],
+    tile: &'a Tile,
+    /// Where in its pixel each ray goes through: see [`View::ray`].
+    offset: [f32; 2],
+}
+
+impl<const W: usize> Task for CameraRays<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { view, blocks, rays, tile, offset } = self;
+        // Lanes beyond the border get rays like the others: they cost nothing and are not traced.
+        for (block, rays) in blocks.iter().zip(rays) {
+            for lane in 0..W {
+                let (x, y) = place_of::<W>(tile.x + block.x, tile.y + block.y, lane);
+                rays.set(lane, &view.ray(x, y, offset));
             }
         }
     }
@@ -317,9 +329,8 @@ impl<const W: usize> Scratch<W> {
         for y in (y..tile.height.min(y + SQUARE)).step_by(height as usize) {
             for x in (x..tile.width.min(x + SQUARE)).step_by(width as usize) {
                 self.active[used] = lanes_inside::<W>(tile, x, y);
-                let block = &mut self.blocks[used];
-                (block.x, block.y) = (x, y);
-                block.sum = [Vec3::ZERO; W];
+                self.blocks[used] = Block { x, y };
+                self.shades[used].sum = [[0.0; W]; 3];
                 used += 1;
             }
         }
@@ -332,12 +343,11 @@ fn count(lanes: &[u32]) -> u64 {
     lanes.iter().map(|lanes| u64::from(lanes.count_ones())).sum()
 }
 
-/// Where in the tile's pixels a lane of the block at (`x`, `y`) is.
-#[inline]
-fn pixel_index<const W: usize>(tile: &Tile, x: u32, y: u32, lane: usize) -> usize {
+/// Where the pixel of a lane is, for the block at (`x`, `y`).
+#[inline(always)]
+fn place_of<const W: usize>(x: u32, y: u32, lane: usize) -> (u32, u32) {
     let width = block_size(W).0;
-    let (x, y) = (x + lane as u32 % width, y + lane as u32 / width);
-    (y * tile.width + x) as usize
+    (x + lane as u32 % width, y + lane as u32 / width)
 }
 
 #[cfg(test)]
@@ -354,7 +364,8 @@ mod tests {
                 let used = scratch.cover(&tile, x, y);
                 for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
                     for lane in lanes(active) {
-                        seen[pixel_index::<W>(&tile, block.x, block.y, lane)] += 1;
+                        let (x, y) = place_of::<W>(block.x, block.y, lane);
+                        seen[(y * tile.width + x) as usize] += 1;
                     }
                 }
             }

@@ -105,6 +105,11 @@ impl Accel {
         self.accuracy = accuracy;
     }
 
+    /// The instruction set that kernels run on, for work beside them.
+    pub(crate) const fn chosen(&self) -> Chosen {
+        self.chosen
+    }
+
     /// Bytes of what the chosen accuracies keep beside the tree: none but for [`Accuracy::Fast`].
     pub fn record_bytes(&self) -> usize {
         size_of_val(&self.projected[..])

@@ -111,15 +111,11 @@ impl<S: Surface> EffectTask<'_, S> {
         }
 
         for pixel in 0..count {
-            let place = ((y + pixel as u32 / width) * tile.width + x + pixel as u32 % width) as usize;
-            pixels.color[place] = self.shown(scratch, pixel);
+            let (x, y) = (x + pixel as u32 % width, y + pixel as u32 / width);
+            pixels.color.put(x, y, self.shown(scratch, pixel));
             let (depth, normal) = scratch.seen[pixel].unwrap_or((f32::INFINITY, Vec3::ZERO));
-            if let Some(to) = pixels.depth.get_mut(place) {
-                *to = depth;
-            }
-            if let Some(to) = pixels.normal.get_mut(place) {
-                *to = normal.to_array();
-            }
+            pixels.depth.put(x, y, depth);
+            pixels.normal.put(x, y, normal.to_array());
         }
     }
 
