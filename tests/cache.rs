@@ -21,7 +21,13 @@ fn pictures_are_the_same_within_the_memory_given() {
     place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));
     // What the process takes anyway is in it, so that a debug build has to have some room.
     const BUDGET: u64 = 48 << 20;
-    for how in ["", "--loading sync --policy lru --block 16384", "--nodes 0.3:fifo --ways 4 --stripes 3"] {
+    for how in [
+        "",
+        "--prefetch off",
+        "--prefetch ahead --policy lru --loaders 3",
+        "--loading sync --policy lru --block 16384",
+        "--nodes 0.3:fifo --ways 4 --stripes 3",
+    ] {
         place.succeed(&format!("render plant.rpk -o part.png {VIEW} --memory 48MiB {how} --json part.json"));
         for frame in 0..3 {
             let [part, whole] = ["part", "whole"].map(|name| place.read(&format!("{name}_00{frame}.png")));
@@ -42,6 +48,30 @@ fn pictures_are_the_same_within_the_memory_given() {
     }
     let text = place.succeed("render plant.rpk -o part.png --size 64x48 --memory 48MiB");
     assert!(text.contains("of 48.0 MiB at most") && text.contains("% of uses hit"), "{text}");
+}
+
+#[test]
+fn what_comes_before_it_is_needed_changes_no_picture() {
+    let place = place(400_000);
+    place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));
+    // From the disk, so that blocks have to be waited for, where the system can read so.
+    let can =
+        place.raypack("render plant.rpk -o part.png --memory 48MiB --direct").output().expect("it runs");
+    let direct = if can.status.success() { "--direct" } else { "" };
+    for how in ["--loaders 1", "--policy fifo --ways 3", "--nodes 0.3:lru", "--block 16384"] {
+        let options = format!("--memory 48MiB --tile 8 --prefetch ahead {how} {direct} --json part.json");
+        let text = place.succeed(&format!("render plant.rpk -o part.png {VIEW} {options}"));
+        for frame in 0..3 {
+            let [part, whole] = ["part", "whole"].map(|name| place.read(&format!("{name}_00{frame}.png")));
+            assert!(part == whole, "frame {frame} {how}");
+        }
+        let cache = place.json("part.json")["cache"].clone();
+        let number = |key: &str| cache[key].as_u64().unwrap_or_else(|| panic!("{key} in {cache}"));
+        assert!(number("prefetched_used") + number("prefetched_unused") <= number("prefetched"), "{cache}");
+        assert_eq!(cache["options"]["prefetch"], "ahead", "{cache}");
+        let told = text.contains("blocks came before they were needed: ");
+        assert_eq!(told, number("prefetched") > 0, "{text}");
+    }
 }
 
 #[test]
@@ -73,6 +103,8 @@ fn too_little_memory_and_nonsense_are_refused_beforehand() {
         ("--memory 1GiB --block 5000", &["--block: 5000 is not a power of two"]),
         ("--memory 1GiB --ways 0", &["--ways: 0"]),
         ("--memory 1GiB --loading never", &["--loading: \"never\" is neither async nor sync"]),
+        ("--memory 1GiB --prefetch maybe", &["--prefetch: \"maybe\" is not one of off, beside, ahead"]),
+        ("--memory 1GiB --prefetch beside --loading sync", &["--prefetch: blocks come", "--loading async"]),
         ("--memory 1GiB --nodes 2:lru", &["--nodes: 2 is not a share"]),
         ("--memory 1GiB --nodes half", &["--nodes: \"half\" is not PART:POLICY"]),
         ("--memory 1GiB --accuracy fast", &["--accuracy: fast keeps a record of every triangle"]),
@@ -118,12 +150,14 @@ fn a_flight_tells_what_each_cache_did() {
     let place = place(150_000);
     let text = place.succeed(
         "cache plant.rpk --frames 3 --size 96x96 --budgets 40,400 --policies lru,sieve --loading sync,async \
-         --loaders 3 --threads 2 --json flight.json --plot flight.svg",
+         --prefetch off,beside,ahead --loaders 3 --threads 2 --json flight.json --plot flight.svg",
     );
     assert!(text.is_empty() || text.contains("resident"), "{text}");
     let report = place.json("flight.json");
     let rows = report["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 1 + 2 * 2 * 2 * 2);
+    assert_eq!(rows.len(), 1 + 2 * 2 * (1 + 3) * 2, "shares, policies, ways of loading, cold and warm");
+    let ahead = rows.iter().filter(|row| row["cache"]["prefetch"] == "ahead");
+    assert_eq!(ahead.count(), 2 * 2 * 2, "shares, policies, cold and warm");
     assert!(rows[0]["policy"].is_null() && rows[0]["rays_per_s"].as_f64().expect("a rate") > 0.0);
     let blocks = report["data_bytes"].as_u64().expect("a number") / 4096 + 5;
     let mut cold_loads = 0;
@@ -135,15 +169,19 @@ fn a_flight_tells_what_each_cache_did() {
         let evictions = |frame: &serde_json::Value| frame["cache"]["evictions"].as_u64().expect("a number");
         let evicted: u64 = row["frames"].as_array().expect("frames").iter().map(evictions).sum();
         if row["budget"].as_f64().expect("a share") > 1.0 {
-            // Everything fits: what was read once is not read again.
+            // Everything fits: what was read once is not read again, unless it came too early and was given up.
             assert_eq!(evicted, 0, "{row}");
+            if row["cache"]["prefetch"] == "ahead" {
+                continue;
+            }
             cold_loads = number("loads") + if warm { cold_loads } else { 0 };
             assert!(cold_loads <= blocks, "{row}");
         }
     }
     // As in the paper: a table for each share and way of loading, of a row a frame and a column a policy.
     let tables = report["tables"].as_array().expect("a list");
-    assert_eq!(tables.len(), 2 * 2 * 2, "shares, ways of loading, cold and warm");
+    assert_eq!(tables.len(), 2 * (1 + 3) * 2, "shares, ways of loading, cold and warm");
+    assert_eq!(tables.iter().filter(|table| table["prefetch"] == "ahead").count(), 2 * 2);
     for table in tables {
         assert_eq!(table["policies"], serde_json::json!(["lru", "sieve"]), "{table}");
         let rows = table["rays_per_s"].as_array().expect("a list");
@@ -153,6 +191,9 @@ fn a_flight_tells_what_each_cache_did() {
     assert_eq!(report["paper"]["rays_per_s"], serde_json::json!([3e3, 12e3]));
     for line in [
         "rays/s by frame, 40 % in memory, sync, cold",
+        "rays/s by frame, 40 % in memory, async, cold",
+        "rays/s by frame, 40 % in memory, beside, cold",
+        "rays/s by frame, 40 % in memory, ahead, warm",
         "frame  ",
         "3 to 12 thousand rays/s, 21 s for a frame",
     ] {

@@ -4,22 +4,24 @@
 //! absent is read by itself or by a loader; what had to go is retired, and freed when nobody can be reading
 //! it any more.
 
+use super::ahead::Ahead;
 use super::arena::Arena;
 use super::deadline::Deadline;
 use super::directory::{Asked, Directory, Pins};
 use super::epoch::Epochs;
 use super::gate::Gate;
 use super::layout::Layout;
-use super::plan::{CacheOptions, Loading, Plan};
+use super::loaders::Loaders;
+use super::plan::{CacheOptions, Loading, Plan, Prefetch};
 use super::quota::Quota;
 use super::source::Source;
 use super::stats::{CacheStats, Counters, add, nanos};
-use super::sync::thread::{self, JoinHandle};
+use super::sync::thread;
 use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, MutexGuard, Ordering, PoisonError};
 use super::words::Words;
 use crate::error::Error;
-use crossbeam::channel::{Receiver, Sender, bounded};
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// The most threads that may read at a time.
@@ -33,9 +35,6 @@ const READ: usize = 4096;
 /// resident scene's speed, with 16 at 0.83, with this at 0.87; where blocks had to go, it made no difference.
 const SESSIONS_PER_TICK: u32 = 64;
 
-/// Requests that wait for a loader.
-const QUEUE: usize = 256;
-
 /// All blocks of a scene, and those of them that are here.
 #[derive(Debug)]
 pub struct Blocks {
@@ -48,7 +47,11 @@ pub struct Blocks {
     /// Sessions so far: see [`tick`](Self::tick).
     pub sessions: AtomicU32,
     pub counters: Counters,
-    pins: Pins,
+    pub pins: Pins,
+    /// What came ahead of need.
+    pub ahead: Ahead,
+    /// Whether blocks come with those that lie beside them.
+    pub brings_others: bool,
     quota: Quota,
     directories: [Option<Directory>; 2],
     source: Box<dyn Source>,
@@ -72,13 +75,6 @@ pub struct Blocks {
 #[derive(Debug)]
 pub struct Late;
 
-/// The loaders, which end when this is dropped.
-#[derive(Debug, Default)]
-pub struct Loaders {
-    requests: Option<Sender<u32>>,
-    threads: Vec<JoinHandle<()>>,
-}
-
 impl Blocks {
     /// No block is here.
     ///
@@ -92,6 +88,9 @@ impl Blocks {
         threads: usize,
     ) -> std::io::Result<(Arc<Self>, Loaders)> {
         let count = layout.blocks();
+        // Some loaders stay free for what is needed, and no more is read at a time than may be here.
+        let loaders = options.loading.loaders();
+        let ahead = (loaders / 2).max(1).min(plan.ahead / 2);
         let gate = matches!(options.loading, Loading::Asynchronous { .. }).then(|| Gate::new(threads));
         let blocks = Arc::new(Self {
             arena: Arena::new(count << layout.shift())?,
@@ -101,6 +100,8 @@ impl Blocks {
             sessions: AtomicU32::new(0),
             counters: Counters::default(),
             pins: Pins::new(count),
+            ahead: Ahead::new(plan.ahead - ahead),
+            brings_others: options.prefetch == Prefetch::Beside,
             quota: Quota::new(plan.pinned),
             directories: plan.shapes.map(|shape| shape.map(Directory::new)),
             source,
@@ -115,20 +116,7 @@ impl Blocks {
             failed: AtomicBool::new(false),
             layout,
         });
-        let mut loaders = Loaders::default();
-        if let Loading::Asynchronous { loaders: count } = options.loading {
-            let (sender, requests) = bounded(QUEUE);
-            loaders.requests = Some(sender);
-            for number in 0..count {
-                let (blocks, requests): (_, Receiver<u32>) = (Arc::clone(&blocks), requests.clone());
-                let loader = thread::Builder::new().name(format!("loader-{number}"));
-                loaders.threads.push(loader.spawn(move || {
-                    for block in &requests {
-                        blocks.load(block, false);
-                    }
-                })?);
-            }
-        }
+        let loaders = Loaders::new(&blocks, loaders, ahead)?;
         Ok((blocks, loaders))
     }
 
@@ -143,7 +131,7 @@ impl Blocks {
         Words::bytes(count) + Pins::bytes(count) + READERS * 128
     }
 
-    fn directory(&self, block: u32) -> &Directory {
+    pub fn directory(&self, block: u32) -> &Directory {
         let second = block as usize >= self.layout.first_of_leaves();
         let [first, other] = &self.directories;
         other.as_ref().filter(|_| second).or(first.as_ref()).expect("there is a first directory")
@@ -183,33 +171,49 @@ impl Blocks {
             let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
             gathered.pinned.push(block);
             missed += u64::from(asked != Asked::Here);
-            if asked == Asked::Absent {
-                absent.push(block);
+            match asked {
+                // It may have come ahead of need since it was looked for.
+                Asked::Here => self.words.use_first(block as usize, self.tick()),
+                Asked::Coming => (),
+                Asked::Absent => absent.push(block),
             }
         }
-        match &loaders.requests {
-            Some(requests) => {
-                // What the system has in memory is copied sooner than it is asked for.
-                absent.retain(|&block| !self.load(block, true));
-                for &block in &absent {
-                    step_aside();
-                    requests.send(block).expect("loaders outlive who waits");
-                }
+        if loaders.are_there() {
+            // What the system has in memory is copied sooner than it is asked for.
+            absent.retain(|&block| !self.load(block, true));
+        }
+        for &block in &absent {
+            if loaders.are_there() {
+                step_aside();
+                self.ahead.was_slow();
             }
-            None => absent.iter().for_each(|&block| {
-                self.load(block, false);
-            }),
+            self.need(loaders, block);
         }
         add(&self.counters.misses, missed);
         for &block in wanted {
-            if !self.words.is_here(block as usize) {
+            while !self.words.is_here(block as usize) {
                 step_aside();
                 if !self.directory(block).wait(block, &self.deadline) {
                     return Err(Late);
                 }
+                if self.words.is_here(block as usize) || self.has_failed() {
+                    break;
+                }
+                // It was to come ahead of need, and did not. Now it is needed.
+                let gone = &mut |gone| self.retire(gone);
+                if self.directory(block).ask(block, &self.words, &self.pins, gone) == Asked::Absent {
+                    self.need(loaders, block);
+                }
             }
         }
         Ok(gathered)
+    }
+
+    /// Has a block come that the directory has said is absent: asks a loader for it, or reads it here if there is none.
+    fn need(&self, loaders: &Loaders, block: u32) {
+        if !loaders.need(block) {
+            self.load(block, false);
+        }
     }
 
     /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
@@ -217,6 +221,11 @@ impl Blocks {
     fn retire(&self, gone: u32) {
         add(&self.counters.evictions, 1);
         self.short.store(true, Ordering::Relaxed);
+        self.let_go(gone);
+    }
+
+    /// The same of a block that went for nothing that is needed: memory is not short for that.
+    pub fn let_go(&self, gone: u32) {
         let mut retired = self.retired();
         retired.push_back((self.epochs.retire(), gone));
     }
@@ -250,25 +259,32 @@ impl Blocks {
     }
 
     /// Waits until there is memory for one more block, and takes it.
-    fn make_room(&self) {
+    pub fn make_room(&self) {
         let mut tries = 0;
+        while !self.try_room() {
+            // Readers leave their epochs within a tile.
+            tries += 1;
+            if tries < 16 {
+                thread::yield_now()
+            } else {
+                thread::sleep(Duration::from_micros(50))
+            }
+            if tries % 16 == 0 {
+                self.shrink();
+            }
+        }
+    }
+
+    /// Takes memory for one more block, if there is some or nobody reads any more what has some.
+    pub fn try_room(&self) -> bool {
         loop {
             let take = |committed| (committed < self.limit).then_some(committed + 1);
             if let Ok(before) = self.committed.fetch_update(Ordering::AcqRel, Ordering::Acquire, take) {
                 self.most_committed.fetch_max(before + 1, Ordering::Relaxed);
-                return;
+                return true;
             }
-            // Readers leave their epochs within a tile.
             if !self.reclaim() {
-                tries += 1;
-                if tries < 16 {
-                    thread::yield_now()
-                } else {
-                    thread::sleep(Duration::from_micros(50))
-                }
-                if tries % 16 == 0 {
-                    self.shrink();
-                }
+                return false;
             }
         }
     }
@@ -282,40 +298,31 @@ impl Blocks {
 
     /// Brings a block that the directory has said is absent; with `at_once` only if nothing has to be waited
     /// for. Whether it is done, with success or without.
-    fn load(&self, block: u32, at_once: bool) -> bool {
-        let tick = self.tick();
-        // It may have been given up just now: then it is still where it was.
-        let kept = {
-            let mut retired = self.retired();
-            let at = retired.iter().position(|&(_, gone)| gone == block);
-            at.and_then(|at| retired.remove(at)).is_some()
-        };
-        if kept {
-            self.directory(block).arrived(block, &self.words, tick);
-            return true;
+    pub fn load(&self, block: u32, at_once: bool) -> bool {
+        self.is_settled(block) || {
+            self.make_room();
+            self.load_into_room(block, at_once)
         }
-        if self.has_failed() {
-            // Everybody gives up.
+    }
+
+    /// Whether there is nothing to read for a block that the directory has said is absent: it was given up just now
+    /// and is kept, or everybody gives up.
+    pub fn is_settled(&self, block: u32) -> bool {
+        let is_kept = self.is_kept(block);
+        if is_kept {
+            self.directory(block).arrived(block, &self.words, self.tick());
+        } else if self.has_failed() {
             self.directory(block).failed(block);
             return true;
         }
-        self.make_room();
-        let start = Instant::now();
-        let (array, byte, bytes) = self.layout.locate(block);
-        // SAFETY: readers look only at what is here; the block is not, its last memory has been freed, and
-        // the directory tells one thread alone to load it.
-        let into =
-            unsafe { self.arena.fill((block as usize) << self.layout.shift(), bytes.next_multiple_of(READ)) };
-        let read = if at_once {
-            self.source.read_at_once(array, byte, into)
-        } else {
-            self.source.read(array, byte, into).map(|()| true)
-        };
-        match read {
+        is_kept
+    }
+
+    /// As [`load`](Self::load), where there is room for the block already.
+    pub fn load_into_room(&self, block: u32, at_once: bool) -> bool {
+        let tick = self.tick();
+        match self.read(block..block + 1, at_once) {
             Ok(true) => {
-                add(&self.counters.loads, 1);
-                add(&self.counters.bytes_read, bytes as u64);
-                add(&self.counters.loading_ns, nanos(start.elapsed()));
                 self.directory(block).arrived(block, &self.words, tick);
                 true
             }
@@ -334,8 +341,39 @@ impl Blocks {
         }
     }
 
+    /// Whether a block that the directory has said is absent was given up just now: then it is still where it was,
+    /// and is kept.
+    pub fn is_kept(&self, block: u32) -> bool {
+        let mut retired = self.retired();
+        let at = retired.iter().position(|&(_, gone)| gone == block);
+        at.and_then(|at| retired.remove(at)).is_some()
+    }
+
+    /// Reads blocks of one array that the directory has said are absent to their places, for which there is room.
+    /// `at_once` as in [`load`](Self::load): `false` if something would have to be waited for.
+    pub fn read(&self, blocks: Range<u32>, at_once: bool) -> crate::error::Result<bool> {
+        let start = Instant::now();
+        let (array, byte, bytes) = self.layout.locate(blocks.clone());
+        let place = (blocks.start as usize) << self.layout.shift();
+        // SAFETY: readers look only at what is here; the blocks are not, their last memory has been freed, and
+        // the directory tells one thread alone to load them.
+        let into = unsafe { self.arena.fill(place, bytes.next_multiple_of(READ)) };
+        let is_read = if at_once {
+            self.source.read_at_once(array, byte, into)?
+        } else {
+            self.source.read(array, byte, into)?;
+            true
+        };
+        if is_read {
+            add(&self.counters.loads, blocks.len() as u64);
+            add(&self.counters.bytes_read, bytes as u64);
+            add(&self.counters.loading_ns, nanos(start.elapsed()));
+        }
+        Ok(is_read)
+    }
+
     /// Gives back the memory of a block that has not come.
-    fn give_room(&self, block: u32) {
+    pub fn give_room(&self, block: u32) {
         // SAFETY: it never was here.
         unsafe { self.release(block) };
         self.committed.fetch_sub(1, Ordering::AcqRel);
@@ -355,7 +393,7 @@ impl Blocks {
 
     /// What was done since the last call.
     pub fn take_stats(&self) -> CacheStats {
-        self.counters.take(self.words.take_uses())
+        self.counters.take(self.words.take_uses(), self.words.take_ahead())
     }
 
     /// Bytes of blocks that have memory, and the most that ever had.
@@ -368,6 +406,7 @@ impl Blocks {
         for directory in self.directories.iter().flatten() {
             directory.clear(&self.words, &self.pins, &mut |gone| self.retire(gone));
         }
+        self.ahead.clear();
         self.reclaim();
     }
 }
@@ -387,16 +426,6 @@ impl Drop for Gathered<'_> {
     }
 }
 
-impl Drop for Loaders {
-    fn drop(&mut self) {
-        drop(self.requests.take());
-        for loader in self.threads.drain(..) {
-            // It ends with its last request; had it panicked, who waits for its block would wait forever.
-            loader.join().expect("loaders do not panic");
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::layout::Array;
@@ -411,7 +440,9 @@ mod tests {
 
     impl Source for Numbered {
         fn read(&self, _: Array, byte: usize, into: &mut [u8]) -> crate::error::Result<()> {
-            into.as_chunks_mut::<4>().0.fill(((byte / BLOCK) as u32 + 1).to_le_bytes());
+            for (block, into) in (byte / BLOCK..).zip(into.chunks_mut(BLOCK)) {
+                into.as_chunks_mut::<4>().0.fill((block as u32 + 1).to_le_bytes());
+            }
             Ok(())
         }
 
@@ -431,6 +462,7 @@ mod tests {
         let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
         let most = 3;
         let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
+        let plan = Plan { ahead: if options.prefetch == Prefetch::Ahead { 3 } else { 0 }, ..plan };
         let (blocks, loaders) =
             Blocks::new(layout, Box::new(Numbered), options, &plan, threads).expect("starts");
         let late = AtomicU32::new(0);
@@ -460,6 +492,15 @@ mod tests {
                     let reader = blocks.epochs.reader().expect("there is room");
                     for _ in 0..rounds {
                         let wanted: Vec<u32> = (0..=random(most)).map(|_| random(BLOCKS) as u32).collect();
+                        if random(3) == 0 {
+                            let guess: Vec<u32> = (0..random(8)).map(|_| random(BLOCKS) as u32).collect();
+                            loaders.ahead(&guess);
+                        }
+                        if options.prefetch == Prefetch::Beside && random(50) == 0 {
+                            // Room, and a new frame in which nothing had to go so far.
+                            blocks.clear();
+                            blocks.short.store(false, Ordering::Relaxed);
+                        }
                         let Ok(gathered) = blocks.gather(loaders, &wanted, || ()) else {
                             late.fetch_add(1, Ordering::Relaxed);
                             continue;
@@ -484,7 +525,17 @@ mod tests {
         assert!(blocks.committed_bytes()[1] <= plan.all * BLOCK);
         let late = late.into_inner();
         assert!(late > 0 || !bounded, "the test tests nothing");
-        assert!(bounded || blocks.take_stats().evictions > u64::from(rounds));
+        loaders.wait_ahead();
+        let stats = blocks.take_stats();
+        assert!(bounded || stats.evictions > u64::from(rounds));
+        let comes = options.loading.loaders() > 0;
+        assert_eq!(stats.prefetched > 0, comes, "{stats:?}");
+        let left = (0..BLOCKS).filter(|&block| blocks.words.is_unused(block)).count();
+        assert_eq!(stats.prefetched, stats.prefetched_used + stats.prefetched_unused + left as u64);
+        if options.prefetch == Prefetch::Ahead {
+            assert!(bounded || comes == (stats.prefetched_used > 0), "{stats:?}");
+            assert!(left <= plan.ahead, "{left} blocks that nobody has used");
+        }
         // Nothing is left pinned, or taken from the quota.
         for block in 0..BLOCKS as u32 {
             let _ = blocks.gather(&loaders, &[block], || ()).expect("there is no deadline");
@@ -505,6 +556,7 @@ mod tests {
                     nodes: None,
                     loading,
                     direct: false,
+                    prefetch: [Prefetch::Ahead, Prefetch::Beside][i % 2],
                 };
                 stress(6, &options, 3000, false);
                 stress(6, &options, 3000, true);

@@ -113,6 +113,18 @@ impl Set {
     }
 }
 
+impl Sets {
+    /// A block that was on its way to a set is here, and was used so.
+    fn arrived(&mut self, at: usize, block: u32, seen: Use) {
+        self.coming.remove(&block);
+        let set = &mut self.sets[at];
+        set.coming -= 1;
+        let mut way = Way { block, seen, mark: 0 };
+        set.policy.arrived(&mut way);
+        set.ways.push(way);
+    }
+}
+
 impl Directory {
     /// Empty sets.
     pub fn new(shape: Shape) -> Self {
@@ -143,6 +155,35 @@ impl Directory {
         let (_, mut sets, at) = self.lock(block);
         // Under the lock, so that nobody is giving it up at the moment.
         pins.0[block as usize].fetch_add(1, Ordering::AcqRel);
+        self.ask_locked(&mut sets, at, block, words, pins, gone)
+    }
+
+    /// The same without pinning it.
+    pub fn ask(&self, block: u32, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) -> Asked {
+        let (_, mut sets, at) = self.lock(block);
+        self.ask_locked(&mut sets, at, block, words, pins, gone)
+    }
+
+    /// Asks for an absent block that has a way free in its set: whether it is that, and now the caller's to bring.
+    pub fn claim(&self, block: u32, words: &Words) -> bool {
+        let (_, mut sets, at) = self.lock(block);
+        let Sets { sets, coming } = &mut *sets;
+        let set = &mut sets[at];
+        let has_way = set.ways.len() + set.coming < self.shape.ways;
+        let is_absent = has_way && !words.is_here(block as usize) && coming.insert(block);
+        set.coming += usize::from(is_absent);
+        is_absent
+    }
+
+    fn ask_locked(
+        &self,
+        sets: &mut Sets,
+        at: usize,
+        block: u32,
+        words: &Words,
+        pins: &Pins,
+        gone: &mut dyn FnMut(u32),
+    ) -> Asked {
         if words.is_here(block as usize) {
             return Asked::Here;
         }
@@ -158,14 +199,28 @@ impl Directory {
     /// The block has come: all of it has been written.
     pub fn arrived(&self, block: u32, words: &Words, tick: u32) {
         let (stripe, mut sets, at) = self.lock(block);
-        sets.coming.remove(&block);
-        let seen = words.arrive(block as usize, tick);
-        let set = &mut sets.sets[at];
-        set.coming -= 1;
-        let mut way = Way { block, seen, mark: 0 };
-        set.policy.arrived(&mut way);
-        set.ways.push(way);
+        sets.arrived(at, block, words.arrive(block as usize, tick));
         stripe.arrived.notify_all();
+    }
+
+    /// The block has come ahead of need; whether nobody needs it yet.
+    pub fn arrived_ahead(&self, block: u32, words: &Words, pins: &Pins, tick: u32) -> bool {
+        let (stripe, mut sets, at) = self.lock(block);
+        // Who has pinned it looks at it without another word.
+        let is_needed = pins.is_pinned(block);
+        let arrive = if is_needed { Words::arrive_used } else { Words::arrive_ahead };
+        sets.arrived(at, block, arrive(words, block as usize, tick));
+        stripe.arrived.notify_all();
+        !is_needed
+    }
+
+    /// Declares a block gone that came ahead of need, unless it was used or is pinned, and tells `gone`.
+    pub fn give_up_unused(&self, block: u32, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
+        let (_, mut sets, at) = self.lock(block);
+        if !pins.is_pinned(block) && words.leave_unused(block as usize) {
+            sets.sets[at].ways.retain(|way| way.block != block);
+            gone(block);
+        }
     }
 
     /// The block will not come.

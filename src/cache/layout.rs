@@ -98,16 +98,33 @@ impl Layout {
         self.columns.iter().map(|column| column.bytes).sum()
     }
 
-    /// The array that a block is of, the byte of it that the block begins with, and how many it holds.
-    pub fn locate(&self, block: u32) -> (Array, usize, usize) {
+    /// The array that a block is of.
+    fn array_of(&self, block: u32) -> Array {
         let at = (block as usize) << self.shift;
         let holds = |array: &Array| {
             let Column { base, bytes } = self.column(*array);
             (base..base + bytes).contains(&at)
         };
-        let array = Array::ALL.into_iter().find(holds).expect("a block of the layout");
+        Array::ALL.into_iter().find(holds).expect("a block of the layout")
+    }
+
+    /// The array that some blocks are of, which follow one another, the byte of it that they begin with, and how many
+    /// they hold.
+    pub fn locate(&self, blocks: Range<u32>) -> (Array, usize, usize) {
+        let array = self.array_of(blocks.start);
         let Column { base, bytes } = self.column(array);
-        (array, at - base, self.block_bytes().min(bytes - (at - base)))
+        let first = ((blocks.start as usize) << self.shift) - base;
+        (array, first, (blocks.len() << self.shift).min(bytes - first))
+    }
+
+    /// The blocks of the same array that share a piece of so many bytes with a block; the pieces begin where the
+    /// array does.
+    pub fn beside(&self, block: u32, bytes: usize) -> Range<u32> {
+        let Column { base, bytes: all } = self.column(self.array_of(block));
+        let [first, end] = [base, base + all].map(|byte| byte.div_ceil(self.block_bytes()) as u32);
+        let count = (bytes >> self.shift).max(1) as u32;
+        let start = first + (block - first) / count * count;
+        start..end.min(start + count)
     }
 
     /// The first block of what leaves need.
@@ -121,9 +138,24 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_lies_beside_a_block_is_of_its_array() {
+        let layout = Layout::new([3 * 4096, 9 * 4096 + 1, 0, 5000, 0, 4096], 4096);
+        let beside = |block| layout.beside(block, 16 << 10);
+        assert_eq!([0, 2].map(beside), [0..3, 0..3]);
+        assert_eq!([3, 6, 7, 12].map(beside), [3..7, 3..7, 7..11, 11..13]);
+        assert_eq!([13, 14, 15].map(beside), [13..15, 13..15, 15..16]);
+        assert!((0..16).all(|block| layout.beside(block, 100) == (block..block + 1)));
+        let located: Vec<_> = [3..7, 11..13, 13..15].map(|blocks| layout.locate(blocks)).into();
+        assert_eq!(located[0], (Array::ALL[1], 0, 4 * 4096));
+        assert_eq!(located[1], (Array::ALL[1], 8 * 4096, 4097));
+        assert_eq!(located[2], (Array::ALL[3], 0, 5000));
+    }
+
+    #[test]
     fn every_byte_is_in_one_block() {
         let layout = Layout::new([5000, 0, 4096, 1, 12_288, 40], 4096);
-        let found: Vec<_> = (0..layout.blocks() as u32).map(|block| layout.locate(block)).collect();
+        let found: Vec<_> =
+            (0..layout.blocks() as u32).map(|block| layout.locate(block..block + 1)).collect();
         use Array::{Colors, Nodes, Pages, Surfaces, Triangles};
         let expected = [
             (Nodes, 0, 4096),

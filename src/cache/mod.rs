@@ -28,6 +28,8 @@
 //! | `directory`, `policy/` | sets of blocks behind striped locks, and which block makes room |
 //! | `deadline` | when threads stop waiting |
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
+//! | `requests`, `loaders` | what loaders are asked for: first what is needed, then what may be needed soon |
+//! | `ahead`, `beside`, `glance` | blocks that come before they are needed, and which ones that may be |
 //! | `blocks` | all of these at work: asking, loading, giving up |
 //! | `local`, `known`, `view` | a thread's state, what it has seen, and the tree as it sees it |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
@@ -40,28 +42,34 @@
 //! **Errors.** A block that cannot be read, or is not what was written, unwinds through the kernels of all
 //! threads that need it and becomes an error of the frame: [`Cached::or_error`].
 
+mod ahead;
 mod arena;
 mod at_once;
+mod beside;
 mod blocks;
 mod deadline;
 mod directory;
 mod epoch;
 mod file;
 mod gate;
+mod glance;
 mod known;
 mod layout;
+mod loaders;
 mod local;
 mod plan;
 pub mod policy;
 mod quota;
+mod requests;
 mod source;
 mod stats;
 mod sync;
 mod view;
 mod words;
 
+pub(crate) use glance::Glance;
 pub use layout::Array;
-pub use plan::{CacheOptions, Loading, Plan};
+pub use plan::{CacheOptions, Loading, Plan, Prefetch};
 pub use source::Source;
 pub use stats::CacheStats;
 pub use view::View;
@@ -69,9 +77,10 @@ pub use view::View;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
-use blocks::{Blocks, Late, Loaders};
+use blocks::{Blocks, Late};
 use known::Known;
 use layout::Layout;
+use loaders::Loaders;
 use local::Local;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
@@ -211,6 +220,18 @@ impl Cached {
     pub fn begin_frame(&self) {
         self.was_short.store(self.blocks.short.swap(false, Ordering::Relaxed), Ordering::Relaxed);
         self.waited.store(self.blocks.waits.swap(0, Ordering::Relaxed), Ordering::Relaxed);
+        self.blocks.ahead.begin_frame();
+    }
+
+    /// Whether it pays to look ahead: blocks may come before they are needed, and some had to be waited for, in
+    /// this frame or in the one before.
+    pub(crate) fn looks_ahead(&self) -> bool {
+        self.options.prefetch == Prefetch::Ahead && self.blocks.ahead.pays()
+    }
+
+    /// Looks at the tree as far as it is here, to ask for what is not.
+    pub(crate) fn glance(&self) -> Glance<'_> {
+        Glance::new(self)
     }
 
     /// Whether blocks have had to go, in this frame or in the one before: then it pays to need few of them.
@@ -304,6 +325,7 @@ impl Cached {
 
     /// Forgets all that is not in use at the moment.
     pub fn clear(&self) {
+        self.loaders.forget_ahead();
         self.blocks.clear();
         self.blocks.waits.store(MANY, Ordering::Relaxed);
     }

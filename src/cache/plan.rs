@@ -4,6 +4,7 @@ use super::directory::Shape;
 use super::policy::Replacement;
 use crate::error::{Error, Result};
 use serde::Serialize;
+use std::str::FromStr;
 
 /// What can be chosen about a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -21,6 +22,8 @@ pub struct CacheOptions {
     pub nodes: Option<(f32, Replacement)>,
     /// Who reads.
     pub loading: Loading,
+    /// Which blocks come before they are needed. None do if who needs them reads them.
+    pub prefetch: Prefetch,
     /// Whether reads go past the system's own memory of the file, so that they take what the disk takes. For
     /// measurements; on Linux.
     pub direct: bool,
@@ -35,8 +38,48 @@ impl Default for CacheOptions {
             policy: Replacement::default(),
             nodes: None,
             loading: Loading::Asynchronous { loaders: Loading::LOADERS },
+            prefetch: Prefetch::default(),
             direct: false,
         }
+    }
+}
+
+/// Which blocks come before they are needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prefetch {
+    /// None.
+    Off,
+    /// Those that lie beside one that is needed, with the same read from the disk, as long as nothing has to go for
+    /// want of room.
+    #[default]
+    Beside,
+    /// What the tiles that come next and the next frame will need, as far as a few of their rays tell.
+    Ahead,
+}
+
+impl Prefetch {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Off, Self::Beside, Self::Ahead];
+
+    /// `off`, `beside` or `ahead`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Beside => "beside",
+            Self::Ahead => "ahead",
+        }
+    }
+}
+
+impl FromStr for Prefetch {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let named = Self::ALL.into_iter().find(|prefetch| prefetch.name() == name);
+        named.ok_or_else(|| {
+            Error::option("--prefetch", format!("\"{name}\" is not one of off, beside, ahead"))
+        })
     }
 }
 
@@ -65,6 +108,23 @@ impl Loading {
         match self {
             Self::Synchronous => threads,
             Self::Asynchronous { .. } => threads * PARKED,
+        }
+    }
+
+    /// What tables call it, with some blocks coming before they are needed.
+    pub const fn name(self, prefetch: Prefetch) -> &'static str {
+        match (self, prefetch) {
+            (Self::Synchronous, _) => "sync",
+            (Self::Asynchronous { .. }, Prefetch::Off) => "async",
+            (Self::Asynchronous { .. }, prefetch) => prefetch.name(),
+        }
+    }
+
+    /// Loaders: none, if who needs a block reads it.
+    pub const fn loaders(self) -> usize {
+        match self {
+            Self::Synchronous => 0,
+            Self::Asynchronous { loaders } => loaders,
         }
     }
 }
@@ -109,9 +169,15 @@ pub struct Plan {
     pub shapes: [Option<Shape>; 2],
     /// That may be pinned beyond what sets hold.
     pub pinned: usize,
+    /// That may have come ahead of need and not been used yet, of those that each cache holds: 0, or at least 2.
+    pub ahead: usize,
     /// All that may have memory, with those that have been given up and are still read.
     pub all: usize,
 }
+
+/// Of so many blocks that a cache holds, one may have come ahead of need: few enough that guesses which are wrong
+/// drive out little, and several tiles' needs even so.
+const AHEAD: usize = 16;
 
 impl Plan {
     /// Divides `blocks`. A walk needs up to `most` at a time; so many threads walk.
@@ -131,7 +197,13 @@ impl Plan {
                 [Some(shape(options, policy, nodes)), Some(shape(options, options.policy, held - nodes))]
             }
         };
-        Some(Self { shapes, pinned, all: blocks })
+        let mut plan = Self { shapes, pinned, ahead: 0, all: blocks };
+        if options.prefetch == Prefetch::Ahead && options.loading.loaders() > 0 {
+            // All of them may be nodes, or leaves. One is being read while another is here.
+            let least = plan.shapes.iter().flatten().map(Shape::blocks).min().unwrap_or(0);
+            plan.ahead = Some(least / AHEAD).filter(|&ahead| ahead >= 2).unwrap_or(0);
+        }
+        Some(plan)
     }
 
     /// Blocks that sets hold.
@@ -161,8 +233,11 @@ mod tests {
     #[test]
     fn the_parts_are_no_more_than_the_whole() {
         for nodes in [None, Some((0.25, Replacement::Lru))] {
-            for (ways, stripes) in [(1, 1), (32, 16), (1024, 3), (7, 1024)] {
-                let options = CacheOptions { ways, stripes, nodes, ..CacheOptions::default() };
+            let (off, ahead) = (Prefetch::Off, Prefetch::Ahead);
+            for (ways, stripes, prefetch) in
+                [(1, 1, ahead), (32, 16, Prefetch::Beside), (1024, 3, off), (7, 1024, ahead)]
+            {
+                let options = CacheOptions { ways, stripes, nodes, prefetch, ..CacheOptions::default() };
                 options.check().expect("sensible");
                 for most in [1, 5, 130] {
                     let least = Plan::least(&options, most);
@@ -171,6 +246,13 @@ mod tests {
                         let plan = Plan::new(&options, blocks, most, 16).expect("enough");
                         let held = plan.held();
                         assert!(held >= 2 && plan.pinned >= most);
+                        let each = plan.shapes.iter().flatten().map(|shape| shape.blocks() / 16);
+                        assert!(plan.ahead != 1 && each.clone().all(|most| plan.ahead <= most), "{plan:?}");
+                        assert_eq!(
+                            plan.ahead > 0,
+                            prefetch == ahead && each.clone().all(|most| most > 1),
+                            "{plan:?}"
+                        );
                         assert!(held + plan.pinned < blocks, "{held} + {} of {blocks}", plan.pinned);
                         let all = held + plan.pinned + (blocks / 16).clamp(4, 128);
                         assert!(

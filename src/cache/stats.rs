@@ -17,6 +17,12 @@ pub struct CacheStats {
     pub bytes_read: u64,
     /// Blocks that made room.
     pub evictions: u64,
+    /// Blocks that came ahead of need; those of them that were read are in `loads` as well.
+    pub prefetched: u64,
+    /// Blocks that had come ahead of need, perhaps before the counts were last taken, and were needed then.
+    pub prefetched_used: u64,
+    /// Blocks that had come ahead of need, likewise, and made room before anybody needed them.
+    pub prefetched_unused: u64,
     /// Seconds that threads waited for blocks, added up.
     pub stalled: f64,
     /// Seconds that loaders read, added up.
@@ -38,6 +44,7 @@ pub struct Counters {
     pub loads: AtomicU64,
     pub bytes_read: AtomicU64,
     pub evictions: AtomicU64,
+    pub prefetched: AtomicU64,
     pub stalled_ns: AtomicU64,
     pub loading_ns: AtomicU64,
 }
@@ -53,8 +60,9 @@ pub fn nanos(time: Duration) -> u64 {
 }
 
 impl Counters {
-    /// The counts so far, beside so many uses; begins again from 0.
-    pub fn take(&self, uses: u64) -> CacheStats {
+    /// The counts so far, beside so many uses, and so many blocks that came ahead of need and were used, and went
+    /// unused; begins again from 0. Those have to be taken before: no block is among them that is not counted here.
+    pub fn take(&self, uses: u64, [prefetched_used, prefetched_unused]: [u64; 2]) -> CacheStats {
         let take = |counter: &AtomicU64| counter.swap(0, Ordering::Relaxed);
         CacheStats {
             uses,
@@ -62,6 +70,9 @@ impl Counters {
             loads: take(&self.loads),
             bytes_read: take(&self.bytes_read),
             evictions: take(&self.evictions),
+            prefetched: take(&self.prefetched),
+            prefetched_used,
+            prefetched_unused,
             stalled: take(&self.stalled_ns) as f64 * 1e-9,
             loading: take(&self.loading_ns) as f64 * 1e-9,
         }

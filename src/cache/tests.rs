@@ -9,7 +9,7 @@ use crate::mesh::generate::shapes;
 use crate::mesh::{Attributes, Colors, Material, Mesh, Normal};
 use crate::render::{Frame, RenderSettings, Renderer, Size};
 use crate::scene::{CachedSurface, Camera, Lighting, Look, Surface};
-use crate::traverse::{Accel, Kernel};
+use crate::traverse::{Accel, Kernel, look_ahead};
 use bytemuck::cast_slice;
 use glam::Vec3;
 use std::io;
@@ -105,8 +105,13 @@ impl Scene {
 
     /// Frames of a short path.
     fn frames(&self, accel: &Accel, threads: usize) -> Result<Vec<Frame>> {
+        self.frames_in(accel, threads, 32)
+    }
+
+    /// The same with tiles of so many pixels a side.
+    fn frames_in(&self, accel: &Accel, threads: usize, tile: u32) -> Result<Vec<Frame>> {
         let mut settings = RenderSettings::new(Size { width: 96, height: 80 });
-        settings.tuning.threads = threads;
+        (settings.tuning.threads, settings.tuning.tile) = (threads, tile);
         let renderer = Renderer::new(accel, &self.mesh, settings).expect("sensible");
         let camera = self.camera();
         let lighting = Lighting::for_view(&camera, &self.resident);
@@ -132,6 +137,7 @@ fn kinds() -> impl Iterator<Item = CacheOptions> {
             nodes: (i % 3 == 1).then_some((0.3, Replacement::Lru)),
             loading,
             direct: false,
+            prefetch: Prefetch::ALL[i % 3],
         })
     })
 }
@@ -140,15 +146,26 @@ fn kinds() -> impl Iterator<Item = CacheOptions> {
 fn pictures_are_those_of_the_resident_scene() {
     let scene = Scene::new(plant::generate(PlantParams { triangles: 100_000, seed: 3 }));
     let expected = scene.frames(&scene.resident, 2).expect("from memory");
+    let mut prefetched = 0;
     for (i, options) in kinds().enumerate() {
-        for more in [0, 40, 10_000] {
+        for more in [0, 40, 300, 10_000] {
             let threads = 1 + (i + more) % 4;
             let cached = scene.open(&options, more, threads, scene.source());
             let accel = Accel::of_cached(Arc::clone(&cached));
-            let frames = scene.frames(&accel, threads).expect("can be read");
+            let tile = [8, 32][i / 2 % 2];
+            let frames = scene.frames_in(&accel, threads, tile).expect("can be read");
             assert!(frames == expected, "{options:?}, {more} more, {threads} threads");
+            cached.loaders.wait_ahead();
             let stats = cached.take_stats();
-            assert!(stats.loads > 0 && stats.misses >= stats.loads && stats.uses > stats.loads, "{stats:?}");
+            let asked = stats.misses + stats.prefetched;
+            assert!(stats.loads > 0 && asked >= stats.loads && stats.uses > stats.loads, "{stats:?}");
+            prefetched += stats.prefetched;
+            let gone = stats.prefetched_used + stats.prefetched_unused;
+            assert!(gone <= stats.prefetched, "{stats:?}");
+            assert!(
+                stats.prefetched == 0 || options.prefetch != Prefetch::Off && options.loading.loaders() > 0,
+                "{options:?}"
+            );
             let [now, most] = cached.memory_bytes();
             assert!(now <= most && most <= cached.plan().all * options.block, "{now}, {most}: {options:?}");
             if more == 10_000 {
@@ -158,7 +175,8 @@ fn pictures_are_those_of_the_resident_scene() {
                     cached.plan()
                 );
                 assert!(
-                    stats.evictions > 0 || stats.bytes_read <= cached.data_bytes() as u64,
+                    stats.evictions + stats.prefetched_unused > 0
+                        || stats.bytes_read <= cached.data_bytes() as u64,
                     "each block once"
                 );
             } else if more == 0 {
@@ -166,6 +184,7 @@ fn pictures_are_those_of_the_resident_scene() {
             }
         }
     }
+    assert!(prefetched > 0, "nothing came ahead of need");
 }
 
 #[test]
@@ -231,7 +250,9 @@ fn a_read_that_fails_ends_the_frame_with_its_error() {
     for loading in [Loading::Synchronous, Loading::Asynchronous { loaders: 3 }] {
         for fails_at in [1, 2, 17, 60] {
             let source = InMemory { fails_at: AtomicU64::new(fails_at), slow: 50, ..scene.source() };
-            let options = CacheOptions { block: 4096, ways: 4, loading, ..CacheOptions::default() };
+            // Of what is only asked for ahead of need, nobody is told that it cannot be read.
+            let prefetch = Prefetch::Off;
+            let options = CacheOptions { block: 4096, ways: 4, loading, prefetch, ..CacheOptions::default() };
             let cached = scene.open(&options, 20, 3, source);
             let accel = Accel::of_cached(Arc::clone(&cached));
             let Err(error) = scene.frames(&accel, 3) else {
@@ -249,9 +270,109 @@ fn a_read_that_fails_ends_the_frame_with_its_error() {
 }
 
 #[test]
+fn a_read_that_fails_while_blocks_come_ahead_of_need_fails_the_frame_or_nothing() {
+    let scene = Scene::new(plant::generate(PlantParams { triangles: 100_000, seed: 3 }));
+    let expected = scene.frames(&scene.resident, 2).expect("from memory");
+    let loading = Loading::Asynchronous { loaders: 3 };
+    let options = CacheOptions { loading, prefetch: Prefetch::Ahead, ..CacheOptions::default() };
+    for fails_at in (1..400).step_by(57) {
+        let source = InMemory { fails_at: AtomicU64::new(fails_at), slow: 50, ..scene.source() };
+        let cached = scene.open(&options, 300, 3, source);
+        let accel = Accel::of_cached(Arc::clone(&cached));
+        let mut failures = 0;
+        for _ in 0..2 {
+            match scene.frames_in(&accel, 3, 8) {
+                Ok(frames) => assert!(frames == expected, "{fails_at}"),
+                Err(error) => {
+                    failures += 1;
+                    assert_eq!(error.to_string(), "cannot read scene.rpk: the disk is gone");
+                }
+            }
+        }
+        assert!(failures <= 1, "it fails once");
+    }
+}
+
+#[test]
+fn what_is_looked_for_ahead_of_need_is_what_rays_need() {
+    let scene = Scene::new(plant::generate(PlantParams { triangles: 100_000, seed: 3 }));
+    let view = scene.camera().view(24, 24);
+    let rays = || (0..9).map(|i| view.ray(4 + i % 3 * 8, 4 + i / 3 * 8, [0.5, 0.5]));
+    let options = CacheOptions { prefetch: Prefetch::Ahead, ..CacheOptions::default() };
+    for in_beams in [false, true] {
+        let cached = scene.open(&options, 10_000, 1, scene.source());
+        let accel = Accel::of_cached(Arc::clone(&cached));
+        let trace = || {
+            let _: Vec<_> = rays().map(|ray| accel.intersect(&ray)).collect();
+            cached.take_stats()
+        };
+        let cold = trace();
+        assert!(cold.misses > 0 && cold.prefetched == 0, "{cold:?}");
+        cached.clear();
+        cached.take_stats();
+        // Each look goes on where the last one had to stop.
+        let looks = (0..100).map(|_| {
+            look_ahead(&cached, rays(), in_beams);
+            cached.loaders.wait_ahead();
+            cached.take_stats()
+        });
+        let looks: Vec<CacheStats> = looks.take_while(|stats| stats.prefetched > 0).collect();
+        assert!(looks.len() > 1 && looks.len() < 100, "{} looks", looks.len());
+        assert!(looks.iter().all(|stats| stats.uses == 0 && stats.misses == 0), "to look is not to use");
+        let warm = trace();
+        // Some rays go on beyond the leaves that were looked at.
+        let most = cold.misses * 2 / 3;
+        assert!(in_beams || warm.misses < most, "{} misses of {}", warm.misses, cold.misses);
+        assert!(warm.prefetched_used > 0, "{warm:?}");
+    }
+}
+
+#[test]
+fn nobody_looks_ahead_where_nothing_can_come() {
+    let scene = Scene::new(shapes::soup(4000, 5));
+    let looks_ahead = |accel: &Accel| {
+        let settings = RenderSettings::new(Size { width: 8, height: 8 });
+        Renderer::new(accel, &scene.mesh, settings).expect("sensible").looks_ahead()
+    };
+    assert!(!looks_ahead(&scene.resident), "all is in memory");
+    for prefetch in Prefetch::ALL {
+        let options = CacheOptions { prefetch, ..CacheOptions::default() };
+        let cached = scene.open(&options, 1000, 1, scene.source());
+        assert_eq!(looks_ahead(&Accel::of_cached(cached)), prefetch == Prefetch::Ahead);
+    }
+}
+
+#[test]
+fn slow_reads_ahead_of_need_change_no_picture_and_keep_their_bounds() {
+    let scene = Scene::new(plant::generate(PlantParams { triangles: 100_000, seed: 3 }));
+    let expected = scene.frames(&scene.resident, 2).expect("from memory");
+    let mut prefetched = 0;
+    for (loaders, more, slow) in [(1, 250, 200), (2, 400, 500), (8, 600, 900), (6, 10_000, 300)] {
+        let source = InMemory { slow, ..scene.source() };
+        let most = Arc::clone(&source.most);
+        let loading = Loading::Asynchronous { loaders };
+        let options = CacheOptions { loading, prefetch: Prefetch::Ahead, ..CacheOptions::default() };
+        let cached = scene.open(&options, more, 2, source);
+        let accel = Accel::of_cached(Arc::clone(&cached));
+        let frames = scene.frames_in(&accel, 2, 8).expect("can be read");
+        assert!(frames == expected, "{loaders} loaders, {more} more");
+        assert!(most.load(Ordering::SeqCst) <= loaders);
+        cached.loaders.wait_ahead();
+        let stats = cached.take_stats();
+        prefetched += stats.prefetched;
+        let left = stats.prefetched - stats.prefetched_used - stats.prefetched_unused;
+        assert!(left <= cached.plan().ahead as u64, "{stats:?}, {:?}", cached.plan());
+        cached.clear();
+        assert_eq!(cached.memory_bytes()[0], 0);
+    }
+    assert!(prefetched > 0, "nothing came ahead of need");
+}
+
+#[test]
 fn what_is_cleared_comes_again() {
     let scene = Scene::new(shapes::soup(4000, 5));
-    let cached = scene.open(&CacheOptions::default(), 10_000, 1, scene.source());
+    let options = CacheOptions { prefetch: Prefetch::Off, ..CacheOptions::default() };
+    let cached = scene.open(&options, 10_000, 1, scene.source());
     let accel = Accel::of_cached(Arc::clone(&cached));
     let expected = scene.frames(&accel, 1).expect("can be read");
     let cold = cached.take_stats().loads;

@@ -197,6 +197,43 @@ impl<'a> View<'a> {
         }
     }
 
+    /// Some elements of an array if all of them are here; the blocks that are not go to `lacking`. No use.
+    fn peek<T>(&self, part: &Part<T>, elements: Range<usize>, lacking: &mut Vec<u32>) -> Option<&[T]> {
+        let mut here = true;
+        for block in part.blocks(elements.clone(), self.shift) {
+            if !self.words.is_here(block) {
+                here = false;
+                // Neighbours lie in the same block more often than not.
+                if lacking.last() != Some(&(block as u32)) {
+                    lacking.push(block as u32);
+                }
+            }
+        }
+        here.then(|| self.slice(part, elements))
+    }
+
+    /// A node of the full tree if it is here: see [`peek`](Self::peek).
+    pub(super) fn peek_node(&self, place: usize, lacking: &mut Vec<u32>) -> Option<Node> {
+        self.peek(&self.nodes, place..place + 1, lacking).map(|node| node[0])
+    }
+
+    /// The blocks that a leaf's or a page's list lacks, or if that is here, its triangles, until `lacking` has `most`.
+    pub(super) fn peek_list(&self, leaf: Node, is_page: bool, lacking: &mut Vec<u32>, most: usize) {
+        let list = leaf.references();
+        if list.is_empty() {
+            return;
+        }
+        let part = if is_page { &self.pages } else { &self.references };
+        let Some(primitives) = self.peek(part, list, lacking) else { return };
+        for &primitive in primitives {
+            if lacking.len() >= most {
+                break;
+            }
+            let primitive = primitive as usize;
+            self.peek(&self.triangles, primitive..primitive + 1, lacking);
+        }
+    }
+
     /// Some bytes of an array, entered and copied. Panics if they are out of range.
     pub fn bytes<const N: usize>(&self, array: Array, first: usize) -> [u8; N] {
         let part: Part<u8> = Part::new(&self.cached.blocks, array);

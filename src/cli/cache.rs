@@ -5,6 +5,7 @@ use super::options::{AccuracyOption, as_option, orbit};
 use super::outputs::same_file;
 use super::progress::Bar;
 use super::report::Json;
+use crate::cache::CacheOptions;
 use crate::cache::policy::Replacement;
 use crate::error::{Error, Result};
 use crate::files::check_writable;
@@ -56,6 +57,14 @@ pub struct Args {
     /// Who reads: sync, async
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "sync,async")]
     loading: Vec<String>,
+    /// What comes before it is needed, with loading async: off, beside, ahead
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = CacheOptions::default().prefetch.name()
+    )]
+    prefetch: Vec<String>,
     /// A cache of its own for nodes, with this part (0.01 to 0.99) of the memory and the same policy, as in the
     /// seed paper
     #[arg(long, value_name = "PART")]
@@ -127,6 +136,7 @@ impl Args {
             .collect::<Result<_>>()?;
         let loadings =
             self.loading.iter().map(|name| self.shape.loading(name)).collect::<Result<Vec<_>>>()?;
+        let prefetches = self.prefetch.iter().map(|name| name.parse()).collect::<Result<Vec<_>>>()?;
         let camera = self.camera.as_deref().map(Camera::parse).transpose()?;
         camera.as_ref().map(Camera::check).transpose()?;
         let options = Options {
@@ -137,6 +147,7 @@ impl Args {
             budgets: self.budgets.iter().map(|percent| percent / 100.0).collect(),
             policies,
             loadings,
+            prefetches,
             cache: self.shape.options(),
             nodes: self.nodes,
             threads: tuning.worker_count(),

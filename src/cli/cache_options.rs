@@ -3,7 +3,7 @@
 use super::report::{Lines, bytes, counted, grouped};
 use super::scene::Scene;
 use crate::cache::policy::Replacement;
-use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
+use crate::cache::{CacheOptions, CacheStats, Cached, Loading, Prefetch};
 use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 use crate::simd::Isa;
@@ -50,15 +50,25 @@ pub struct ShapeArgs {
 }
 
 impl CacheArgs {
-    /// The options, checked.
+    /// The options, checked, with these blocks coming before they are needed, if that was asked for.
     ///
     /// # Errors
     /// One makes no sense.
-    pub fn options(&self) -> Result<CacheOptions> {
+    pub fn options(&self, prefetch: Option<Prefetch>) -> Result<CacheOptions> {
+        let loading = self.shape.loading(&self.loading)?;
+        let prefetch = match prefetch {
+            Some(prefetch) if loading.loaders() == 0 && prefetch != Prefetch::Off => {
+                let message =
+                    "blocks come before they are needed only with --loading async; choose that, or off";
+                return Err(Error::option("--prefetch", message));
+            }
+            asked => asked.unwrap_or_default(),
+        };
         let options = CacheOptions {
             policy: self.policy.parse()?,
             nodes: self.nodes.as_deref().map(nodes).transpose()?,
-            loading: self.shape.loading(&self.loading)?,
+            loading,
+            prefetch,
             ..self.shape.options()
         };
         options.check()?;
@@ -80,6 +90,8 @@ pub struct Within {
     pub threads: usize,
     /// What they will trace with.
     pub isa: Isa,
+    /// Which blocks come before they are needed, if that was asked for.
+    pub prefetch: Option<Prefetch>,
 }
 
 impl CacheArgs {
@@ -94,13 +106,13 @@ impl CacheArgs {
         within: Within,
         beside: impl FnOnce(&store::File, usize) -> usize,
     ) -> Result<Scene> {
-        let Within { memory, accuracy, threads, isa } = within;
+        let Within { memory, accuracy, threads, isa, prefetch } = within;
         if accuracy == Accuracy::Fast {
             let message = "fast keeps a record of every triangle beside the tree, for which --memory has no room; \
                            choose watertight or exact";
             return Err(Error::option("--accuracy", message));
         }
-        let options = self.options()?;
+        let options = self.options(prefetch)?;
         let file = store::File::open(path)?;
         let workers = options.loading.workers(threads);
         let beside = beside(&file, workers).saturating_add(workers * BYTES_PER_WORKER);
@@ -181,7 +193,8 @@ impl CacheReport {
             Loading::Asynchronous { loaders } => format!("read by {}", counted(loaders as u64, "loader")),
         };
         lines.add("cache", format!("{policy}, blocks of {} KiB, {who}", block >> 10));
-        let CacheStats { loads, bytes_read, stalled, .. } = self.stats;
+        let CacheStats { loads, bytes_read, stalled, prefetched, prefetched_used, prefetched_unused, .. } =
+            self.stats;
         lines.add(
             "",
             format!(
@@ -191,6 +204,13 @@ impl CacheReport {
                 bytes(bytes_read),
             ),
         );
+        if prefetched > 0 {
+            let [all, used, unused] = [prefetched, prefetched_used, prefetched_unused].map(grouped);
+            lines.add(
+                "",
+                format!("{all} blocks came before they were needed: {used} used, {unused} given up unused"),
+            );
+        }
     }
 }
 

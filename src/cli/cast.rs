@@ -127,7 +127,7 @@ pub fn run(args: &Args) -> Result<()> {
     // Whether there is memory for the rays is known before they are read.
     let part = match args.build.limit()? {
         Some(memory) if is_scene(&args.scene) => {
-            Some(args.open_within(file.count(), Within { memory, accuracy, threads, isa })?)
+            Some(args.open_within(file.count(), Within { memory, accuracy, threads, isa, prefetch: None })?)
         }
         _ => None,
     };

@@ -73,6 +73,11 @@ pub struct Args {
     accuracy: AccuracyOption,
     #[command(flatten)]
     cache: CacheArgs,
+    /// What comes before it is needed, with --loading async: what lies beside a block that is read from the disk, as long
+    /// as there is room (beside: so it is by itself), what coming tiles and the next frame will need (ahead), or nothing
+    /// (off)
+    #[arg(long, value_name = "off|beside|ahead", help_heading = "Scene files within --memory")]
+    prefetch: Option<String>,
     /// Write what each pixel's ray costs instead of what it sees, or how many rays its samples cast for an effect (uses,
     /// such as look-ups of textures, of one that casts none; samples beyond the first of antialiasing): .png in
     /// colours, .exr or .pfm as numbers
@@ -126,7 +131,8 @@ pub fn run(args: &Args) -> Result<()> {
     let mut scene = match (&args.scene, args.build.limit()?) {
         (Some(path), Some(memory)) if is_scene(path) => {
             let threads = settings.tuning.worker_count();
-            args.open_within(path, &settings, Within { memory, accuracy, threads, isa })?
+            let prefetch = args.prefetch.as_deref().map(str::parse).transpose()?;
+            args.open_within(path, &settings, Within { memory, accuracy, threads, isa, prefetch })?
         }
         (Some(path), _) => Scene::prepare(path, &args.build, &profile.build, isa)?,
         (None, _) => Model::demo().build(&args.build, &profile.build, isa)?,
@@ -250,7 +256,8 @@ impl Args {
         let tiles = renderer.tile_count() * cameras.len();
         let fraction = || tiles_done.load(Ordering::Relaxed) as f64 / tiles as f64;
         watch("rendering", fraction, || {
-            for (number, camera) in (0..).zip(cameras) {
+            for (number, &camera) in (0..).zip(&cameras) {
+                renderer.announce(cameras.get(number as usize + 1).copied());
                 let (first, frame, stats) = match first_within {
                     None => {
                         let (frame, stats) = renderer.frame_with_progress(&camera, &lighting, &tiles_done)?;

@@ -9,6 +9,7 @@ mod bounded;
 mod effects;
 mod frame;
 pub mod image;
+mod lookahead;
 mod matt;
 mod offset;
 mod order;

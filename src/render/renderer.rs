@@ -3,6 +3,7 @@
 use super::bounded::{First, FirstStats, StandIn, StandInCost};
 use super::effects::{Appearance, EffectCosts, EffectScratch, EffectTask, Limits, Tallies};
 use super::frame::{Frame, TilePixels};
+use super::lookahead::{Course, Lookahead, Seen};
 use super::order::{Tile, tiles};
 use super::scheduler::{Outcome, Sharing, Workers};
 use super::settings::RenderSettings;
@@ -29,6 +30,8 @@ pub struct Renderer<'a, S = Mesh> {
     learnt: DispatchPool,
     /// Frames so far.
     frames: AtomicUsize,
+    /// Where the camera goes, if anybody looks ahead.
+    course: Option<Course<'a>>,
     /// What boxes cost in the frames before.
     stand_in: StandInCost,
     /// What there is to show beside matt surfaces, if anything.
@@ -39,7 +42,7 @@ pub struct Renderer<'a, S = Mesh> {
 
 /// A frame that is to be drawn.
 struct Wanted<'a> {
-    camera: &'a Camera,
+    seen: Seen,
     lighting: &'a Lighting,
     /// Raised by one with each tile that is complete.
     tiles_done: &'a AtomicUsize,
@@ -71,6 +74,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             tiles,
             learnt,
             frames,
+            course: Course::of(accel),
             stand_in,
             appearance: None,
             limits: Limits::default(),
@@ -105,6 +109,15 @@ impl<'a, S: Surface> Renderer<'a, S> {
         self.tiles.len()
     }
 
+    /// Says which camera comes after the one of the frame that is rendered next, or that none does. Towards the end of
+    /// that frame, what the next one will need first of a scene that is not all in memory is asked for. Where nothing is
+    /// said, the camera is thought to go on as it came.
+    pub fn announce(&self, next: Option<Camera>) {
+        if let Some(course) = &self.course {
+            course.announce(next);
+        }
+    }
+
     /// Renders a frame. Panics if a scene that is not all in memory cannot be read.
     pub fn frame(&self, camera: &Camera, lighting: &Lighting) -> (Frame, FrameStats) {
         self.frame_with_progress(camera, lighting, &AtomicUsize::new(0)).expect("the scene can be read")
@@ -120,7 +133,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         lighting: &Lighting,
         tiles_done: &AtomicUsize,
     ) -> Result<(Frame, FrameStats)> {
-        let wanted = Wanted { camera, lighting, tiles_done, limit: None };
+        let wanted = Wanted { seen: self.seen(camera), lighting, tiles_done, limit: None };
         self.drawn(&wanted).map(|drawn| (drawn.frame, drawn.stats))
     }
 
@@ -137,7 +150,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         tiles_done: &AtomicUsize,
         limit: Duration,
     ) -> Result<(Option<First>, Frame, FrameStats)> {
-        let wanted = Wanted { camera, lighting, tiles_done, limit: Some(limit) };
+        let wanted = Wanted { seen: self.seen(camera), lighting, tiles_done, limit: Some(limit) };
         self.drawn(&wanted).map(|drawn| (drawn.first, drawn.frame, drawn.stats))
     }
 
@@ -163,7 +176,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 &plain
             }
         };
-        let wanted = Wanted { camera, lighting, tiles_done, limit: None };
+        let wanted = Wanted { seen: self.seen(camera), lighting, tiles_done, limit: None };
         let count = || self.drawn_with_effects(appearance, &wanted, Some(effect)).frame;
         let frame = match self.accel.cached() {
             Some(cached) => cached.or_error(count)?,
@@ -210,7 +223,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let start = Instant::now();
         let RenderSettings { size, samples, shadows, aovs, ref tuning } = self.settings;
         let threads = tuning.worker_count();
-        let view = wanted.camera.view(size.width, size.height);
+        let view = wanted.seen.view;
         let mut task = TileTask {
             accel: self.accel,
             calls,
@@ -261,7 +274,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let RenderSettings { size, samples, aovs, ref tuning, .. } = self.settings;
         let task = EffectTask {
             world: appearance.world(self.accel, self.surface, tuning.packet, self.limits),
-            view: wanted.camera.view(size.width, size.height),
+            view: wanted.seen.view,
             samples,
             error: self.limits.error,
             counted,
@@ -270,10 +283,15 @@ impl<'a, S: Surface> Renderer<'a, S> {
             cached.begin_frame();
         }
         let mut frame = Frame::black(size, aovs);
-        let outcome = self.workers().run(
-            self.jobs(&mut frame),
+        let (workers, jobs) = (self.workers(), self.jobs(&mut frame));
+        let lookahead = self.lookahead(&jobs, wanted.seen, &workers);
+        let outcome = workers.run(
+            jobs,
             || EffectScratch::new(self.learnt.take(), counted.is_some()),
             |scratch: &mut EffectScratch, pixels: TilePixels<'_>| {
+                if let Some(lookahead) = &lookahead {
+                    lookahead.at(&pixels.tile);
+                }
                 task.render(scratch, pixels);
                 wanted.tiles_done.fetch_add(1, Ordering::Relaxed);
             },
@@ -315,6 +333,27 @@ impl<'a, S: Surface> Renderer<'a, S> {
         jobs
     }
 
+    /// Whether anything is looked ahead for.
+    #[cfg(test)]
+    pub(crate) const fn looks_ahead(&self) -> bool {
+        self.course.is_some()
+    }
+
+    /// How a frame is seen that begins, and the one after it.
+    fn seen(&self, camera: &Camera) -> Seen {
+        let RenderSettings { size, ref tuning, .. } = self.settings;
+        let view = |camera: &Camera| camera.view(size.width, size.height);
+        let next = self.course.as_ref().and_then(|course| course.after(camera));
+        Seen { view: view(camera), next: next.as_ref().map(view), in_beams: tuning.packet == Kernel::Tile }
+    }
+
+    /// What looks ahead while some tiles are rendered, if anything does.
+    fn lookahead(&self, jobs: &[TilePixels<'_>], seen: Seen, workers: &Workers) -> Option<Lookahead<'a>> {
+        let course = self.course.as_ref()?;
+        let tiles = jobs.iter().map(|pixels| pixels.tile).collect();
+        Some(course.lookahead(seen, tiles, workers, self.settings.tuning.worker_count()))
+    }
+
     /// Who renders tiles.
     fn workers(&self) -> Workers {
         let tuning = &self.settings.tuning;
@@ -342,10 +381,15 @@ impl<'a, S: Surface> Renderer<'a, S> {
     ) where
         RayPacket<W>: PacketWidth<W>,
     {
-        let outcome = self.workers().run(
+        let workers = self.workers();
+        let lookahead = self.lookahead(&jobs, wanted.seen, &workers);
+        let outcome = workers.run(
             jobs,
             || Scratch::<W>::new(self.learnt.take()),
             |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
+                if let Some(lookahead) = &lookahead {
+                    lookahead.at(&pixels.tile);
+                }
                 if task.render(scratch, pixels) {
                     wanted.tiles_done.fetch_add(1, Ordering::Relaxed);
                 }

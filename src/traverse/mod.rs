@@ -10,6 +10,7 @@
 //! nothing.
 
 mod accel;
+mod ahead;
 mod closest;
 mod coarse;
 mod dispatch;
@@ -28,6 +29,7 @@ mod walk;
 mod width;
 
 pub use accel::Accel;
+pub(crate) use ahead::look_ahead;
 pub use coarse::{Entry, first_page};
 pub use dispatch::{Dispatch, DispatchPool, SliceDispatch};
 pub use kernel::Kernel;

@@ -10,8 +10,12 @@
 
 #![allow(dead_code, unused_imports)]
 
+#[path = "../../src/cache/ahead.rs"]
+mod ahead;
 #[path = "../../src/cache/arena.rs"]
 mod arena;
+#[path = "../../src/cache/beside.rs"]
+mod beside;
 #[path = "../../src/cache/blocks.rs"]
 mod blocks;
 #[path = "../../src/cache/deadline.rs"]
@@ -26,12 +30,16 @@ mod gate;
 mod known;
 #[path = "../../src/cache/layout.rs"]
 mod layout;
+#[path = "../../src/cache/loaders.rs"]
+mod loaders;
 #[path = "../../src/cache/plan.rs"]
 mod plan;
 #[path = "../../src/cache/policy/mod.rs"]
 mod policy;
 #[path = "../../src/cache/quota.rs"]
 mod quota;
+#[path = "../../src/cache/requests.rs"]
+mod requests;
 #[path = "../../src/cache/source.rs"]
 mod source;
 #[path = "../../src/cache/stats.rs"]
@@ -60,12 +68,18 @@ use std::env;
 use std::time::Instant;
 
 /// What is tried, and in how many schedules.
-const CHECKS: [(&str, fn(), usize); 9] = [
+const CHECKS: [(&str, fn(), usize); 15] = [
     ("blocks are whole for as long as they are read", scenes::blocks_are_whole, 1500),
     ("the same in sets of one block", scenes::sets_of_one, 1500),
     ("a block may be asked for while it goes", scenes::asked_for_again, 6000),
     ("nobody waits for ever for a block that failed", scenes::a_failure_ends, 1500),
     ("a deadline leaves nothing behind", scenes::a_deadline, 6000),
+    ("a block may be needed while it comes ahead of need", scenes::ahead_of_need, 1500),
+    ("the same ahead of need, in sets of one block", scenes::ahead_in_sets_of_one, 1500),
+    ("what cannot come ahead of need is no error", scenes::ahead_fails, 1500),
+    ("blocks come with those beside them", scenes::beside, 3000),
+    ("one that cannot come is no error for those beside it", scenes::beside_fails, 1500),
+    ("loaders end whatever was asked for ahead of need", scenes::ahead_at_the_end, 1500),
     ("what is retired is freed when nobody reads it", scenes::epochs_hold, 3000),
     ("what is known to be here can be read", scenes::known_lists_hold, 6000),
     ("the gate lets in as many as there are places", scenes::the_gate_holds, 3000),

@@ -1,13 +1,14 @@
 //! Short scenes of two to four threads, each to be played in thousands of ways.
 
-use crate::blocks::{Blocks, Loaders};
+use crate::blocks::Blocks;
 use crate::directory::Shape;
 use crate::epoch::Epochs;
 use crate::error::{Error, Result};
 use crate::gate::Gate;
 use crate::known::Known;
 use crate::layout::{Array, Layout};
-use crate::plan::{CacheOptions, Loading, Plan};
+use crate::loaders::Loaders;
+use crate::plan::{CacheOptions, Loading, Plan, Prefetch};
 use crate::policy::Replacement;
 use crate::quota::Quota;
 use crate::source::Source;
@@ -17,6 +18,9 @@ use std::time::Instant;
 
 const BLOCK: usize = 4096;
 
+/// Blocks that may be here ahead of need, or on their way.
+const AHEAD: usize = 2;
+
 /// Blocks full of their own number; one of them may be one that cannot be read.
 #[derive(Debug)]
 struct Numbered {
@@ -25,15 +29,18 @@ struct Numbered {
 
 impl Source for Numbered {
     fn read(&self, _: Array, byte: usize, into: &mut [u8]) -> Result<()> {
-        if self.broken == Some(byte / BLOCK) {
+        let blocks = byte / BLOCK..(byte + into.len()) / BLOCK;
+        if self.broken.is_some_and(|broken| blocks.contains(&broken)) {
             let source = io::Error::other("the disk is gone");
             return Err(Error::Read { path: "scene.rpk".into(), source });
         }
         // Not all at once: somebody may look meanwhile who should not.
-        let (first, second) = into.split_at_mut(BLOCK / 2);
-        first.fill(number(byte / BLOCK));
-        thread::yield_now();
-        second.fill(number(byte / BLOCK));
+        for (block, into) in blocks.zip(into.chunks_mut(BLOCK)) {
+            let (first, second) = into.split_at_mut(BLOCK / 2);
+            first.fill(number(block));
+            thread::yield_now();
+            second.fill(number(block));
+        }
         Ok(())
     }
 }
@@ -46,7 +53,20 @@ fn number(block: usize) -> u8 {
 /// A cache that holds as few of a scene's blocks as can be: one set, and hardly more memory than what may be
 /// pinned, so that almost every miss drives something out and has to wait until memory is freed.
 fn cache(ways: usize, policy: Replacement, broken: Option<usize>) -> (Arc<Blocks>, Loaders) {
-    const BLOCKS: usize = 6;
+    cache_with(ways, policy, broken, Loading::Synchronous, Prefetch::Off)
+}
+
+const BLOCKS: usize = 6;
+
+/// The same with this loading. Loaders may have two blocks there that nobody has used yet: one of them is being
+/// read.
+fn cache_with(
+    ways: usize,
+    policy: Replacement,
+    broken: Option<usize>,
+    loading: Loading,
+    prefetch: Prefetch,
+) -> (Arc<Blocks>, Loaders) {
     const PINNED: usize = 3;
     let options = CacheOptions {
         block: BLOCK,
@@ -54,12 +74,14 @@ fn cache(ways: usize, policy: Replacement, broken: Option<usize>) -> (Arc<Blocks
         stripes: 1,
         policy,
         nodes: None,
-        loading: Loading::Synchronous,
+        loading,
+        prefetch,
         direct: false,
     };
     let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
     let shape = Shape { stripes: 1, sets: 1, ways, policy };
-    let plan = Plan { shapes: [Some(shape), None], pinned: PINNED, all: ways + PINNED };
+    let ahead = if prefetch == Prefetch::Ahead { AHEAD } else { 0 };
+    let plan = Plan { shapes: [Some(shape), None], pinned: PINNED, ahead, all: ways + PINNED };
     Blocks::new(layout, Box::new(Numbered { broken }), &options, &plan, 3).expect("it can begin")
 }
 
@@ -134,6 +156,108 @@ pub fn a_failure_ends() {
     assert!(came.iter().sum::<usize>() < 9, "one of them cannot come");
     let came = play(1, Replacement::Fifo, Some(2), &[&[&[2]], &[&[2]], &[&[2]]]);
     assert_eq!(came, [0; 3]);
+}
+
+/// Threads read lists of blocks while another one asks for some ahead of need, one list after the other; how much of its
+/// list came to each, and whether a block could not be read that was needed.
+fn play_ahead(
+    loaders: usize,
+    ways: usize,
+    broken: Option<usize>,
+    lists: &[List],
+    guesses: List,
+) -> (Vec<usize>, bool) {
+    let loading = Loading::Asynchronous { loaders };
+    let (blocks, loaders) = cache_with(ways, Replacement::Sieve, broken, loading, Prefetch::Ahead);
+    let loaders = Arc::new(loaders);
+    let threads = start(&blocks, &loaders, lists);
+    for guess in guesses {
+        loaders.ahead(guess);
+        thread::yield_now();
+    }
+    let came = threads.into_iter().map(|thread| thread.join().expect("no panic")).collect();
+    loaders.forget_ahead();
+    let has_failed = blocks.take_failure().is_some();
+    let unused = (0..BLOCKS).filter(|&block| blocks.words.is_unused(block)).count() as u64;
+    // One more could be on its way, but now none is.
+    assert!(unused < AHEAD as u64, "{unused} blocks that nobody has used");
+    let stats = blocks.take_stats();
+    assert_eq!(stats.prefetched, stats.prefetched_used + stats.prefetched_unused + unused, "{stats:?}");
+    leaves_nothing(&blocks);
+    (came, has_failed)
+}
+
+const GUESSES: List = &[&[2, 4], &[1, 0, 5], &[3]];
+
+pub fn ahead_of_need() {
+    let (came, has_failed) = play_ahead(2, 2, None, &PAIRS[..2], GUESSES);
+    assert!(came == [3, 3] && !has_failed, "all of it can be read");
+}
+
+pub fn ahead_in_sets_of_one() {
+    let (came, has_failed) = play_ahead(1, 1, None, &[&[&[1], &[2]], &[&[0], &[1]]], &[&[1], &[0, 2], &[1]]);
+    assert!(came == [2, 2] && !has_failed, "all of it can be read");
+}
+
+pub fn ahead_fails() {
+    let (came, has_failed) = play_ahead(2, 1, Some(2), &[&[&[0], &[1]]], &[&[2, 1], &[2]]);
+    assert!(came == [2] && !has_failed, "nobody needed what could not be read");
+    let (came, has_failed) = play_ahead(2, 1, Some(2), &[&[&[2]], &[&[0], &[2]]], &[&[2, 0], &[2]]);
+    assert!(came[0] == 0 && came[1] < 2 && has_failed, "{came:?}");
+}
+
+/// Threads read lists of blocks, which come with those beside them where there is room, while frames begin; how much of
+/// its list came to each, and whether a block could not be read that was needed.
+fn play_beside(ways: usize, broken: Option<usize>, lists: &[List]) -> (Vec<usize>, bool) {
+    let loading = Loading::Asynchronous { loaders: 2 };
+    let (blocks, loaders) = cache_with(ways, Replacement::Sieve, broken, loading, Prefetch::Beside);
+    let loaders = Arc::new(loaders);
+    let threads = start(&blocks, &loaders, lists);
+    for _ in 0..3 {
+        // Nothing had to go in this one so far.
+        blocks.short.store(false, Ordering::Relaxed);
+        thread::yield_now();
+    }
+    let came = threads.into_iter().map(|thread| thread.join().expect("no panic")).collect();
+    // They end what they have begun.
+    drop(loaders);
+    let has_failed = blocks.take_failure().is_some();
+    let unused = (0..BLOCKS).filter(|&block| blocks.words.is_unused(block)).count() as u64;
+    let stats = blocks.take_stats();
+    assert_eq!(stats.prefetched, stats.prefetched_used + stats.prefetched_unused + unused, "{stats:?}");
+    leaves_nothing(&blocks);
+    (came, has_failed)
+}
+
+pub fn beside() {
+    let (came, has_failed) = play_beside(3, None, &PAIRS[..2]);
+    assert!(came == [3, 3] && !has_failed, "all of it can be read");
+    let (came, has_failed) = play_beside(4, None, &[&[&[1], &[4]], &[&[2], &[5]], &[&[0]]]);
+    assert!(came == [2, 2, 1] && !has_failed, "all of it can be read");
+}
+
+pub fn beside_fails() {
+    let (came, has_failed) = play_beside(4, Some(2), &[&[&[1], &[0]], &[&[3]]]);
+    assert!(came == [2, 1] && !has_failed, "nobody needed what could not be read");
+    let (came, has_failed) = play_beside(4, Some(2), &[&[&[1]], &[&[2]]]);
+    assert!(came[1] == 0 && has_failed, "{came:?}");
+}
+
+pub fn ahead_at_the_end() {
+    let loading = Loading::Asynchronous { loaders: 2 };
+    let (blocks, loaders) = cache_with(1, Replacement::Lru, None, loading, Prefetch::Ahead);
+    loaders.ahead(&[0, 1, 2]);
+    let reader = {
+        let blocks = Arc::clone(&blocks);
+        let loaders = Arc::new(loaders);
+        let others = Arc::clone(&loaders);
+        let reader = thread::spawn(move || read(&blocks, &others, &[3]));
+        loaders.ahead(&[4, 5]);
+        // They end with whoever has them last.
+        reader
+    };
+    assert!(reader.join().expect("no panic"));
+    leaves_nothing(&blocks);
 }
 
 pub fn a_deadline() {

@@ -1,8 +1,8 @@
 //! Rays per second by frame, laid out as the seed paper's tables 1 to 3.
 
 use super::Row;
-use crate::cache::Loading;
 use crate::cache::policy::Replacement;
+use crate::cache::{Loading, Prefetch};
 use crate::study::text::{grid, grouped};
 use serde::Serialize;
 use std::fmt;
@@ -14,6 +14,8 @@ pub struct FrameTable {
     pub budget: f64,
     /// Who reads.
     pub loading: Loading,
+    /// Which blocks came before they were needed.
+    pub prefetch: Prefetch,
     /// Whether caches held what the same flight had left.
     pub warm: bool,
     /// The columns.
@@ -29,12 +31,13 @@ impl FrameTable {
         for row in rows {
             let (Some(policy), Some(loading)) = (row.policy, row.loading) else { continue };
             let is_its = |table: &&mut Self| {
-                (table.budget, table.loading, table.warm) == (row.budget, loading, row.warm)
+                let key = (table.budget, table.loading, table.prefetch, table.warm);
+                key == (row.budget, loading, row.prefetch(), row.warm)
             };
             if tables.iter_mut().find(is_its).is_none() {
                 let rays_per_s = vec![Vec::new(); row.frames.len()];
-                let (budget, warm) = (row.budget, row.warm);
-                tables.push(Self { budget, loading, warm, policies: Vec::new(), rays_per_s });
+                let (budget, prefetch, warm) = (row.budget, row.prefetch(), row.warm);
+                tables.push(Self { budget, loading, prefetch, warm, policies: Vec::new(), rays_per_s });
             }
             let table = tables.iter_mut().find(is_its).expect("it is there now");
             table.policies.push(policy);
@@ -44,7 +47,7 @@ impl FrameTable {
         }
         // A share's tables together, and of these the ones of a way of loading.
         tables.sort_by(|a, b| {
-            let key = |table: &Self| (table.loading != Loading::Synchronous, table.warm);
+            let key = |table: &Self| (table.loading != Loading::Synchronous, table.prefetch, table.warm);
             a.budget.total_cmp(&b.budget).then(key(a).cmp(&key(b)))
         });
         tables
@@ -53,10 +56,7 @@ impl FrameTable {
 
 impl fmt::Display for FrameTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let loading = match self.loading {
-            Loading::Synchronous => "sync",
-            Loading::Asynchronous { .. } => "async",
-        };
+        let loading = self.loading.name(self.prefetch);
         let pass = if self.warm { "warm" } else { "cold" };
         writeln!(f, "rays/s by frame, {:.0} % in memory, {loading}, {pass}", self.budget * 100.0)?;
         let names = self.policies.iter().map(|policy| policy.name().to_string());

@@ -18,7 +18,7 @@ pub use by_frame::{FrameTable, PAPER, Paper};
 pub use report::{FrameRow, Report, Row};
 
 use crate::cache::policy::Replacement;
-use crate::cache::{CacheOptions, Cached, Loading};
+use crate::cache::{CacheOptions, Cached, Loading, Prefetch};
 use crate::error::Result;
 use crate::geometry::Accuracy;
 use crate::render::{RenderSettings, Renderer, Size};
@@ -47,6 +47,8 @@ pub struct Options {
     pub policies: Vec<Replacement>,
     /// Who reads.
     pub loadings: Vec<Loading>,
+    /// Which blocks come before they are needed; where there are loaders to see to that.
+    pub prefetches: Vec<Prefetch>,
     /// All else about the caches.
     pub cache: CacheOptions,
     /// The part of the memory that nodes have to themselves, in a cache of the same policy; `None` for one
@@ -76,9 +78,14 @@ impl Options {
         for &budget in &self.budgets {
             for &policy in &self.policies {
                 for &loading in &self.loadings {
-                    let nodes = self.nodes.map(|part| (part, policy));
-                    let options = CacheOptions { policy, loading, nodes, ..self.cache };
-                    trials.push(Trial { budget, options });
+                    // Who needs a block reads it: nobody asks for any before.
+                    let prefetches =
+                        if loading.loaders() > 0 { &self.prefetches[..] } else { &[Prefetch::Off] };
+                    for &prefetch in prefetches {
+                        let nodes = self.nodes.map(|part| (part, policy));
+                        let options = CacheOptions { policy, loading, prefetch, nodes, ..self.cache };
+                        trials.push(Trial { budget, options });
+                    }
                 }
             }
         }
@@ -152,7 +159,9 @@ impl Flight {
 
     /// Renders all frames, and says what each took.
     fn fly<S: Surface>(&self, renderer: &Renderer<'_, S>, cached: Option<&Cached>) -> Result<Vec<FrameRow>> {
-        let frame = |camera: &Camera| {
+        let frame = |(number, camera): (usize, &Camera)| {
+            // Each pass is a path of its own: what comes after its last frame is no part of it.
+            renderer.announce(self.cameras.get(number + 1).copied());
             let (_, stats) = renderer.frame_with_progress(camera, &self.lighting, &AtomicUsize::new(0))?;
             let cache = cached.map(Cached::take_stats).unwrap_or_default();
             Ok(FrameRow {
@@ -163,7 +172,7 @@ impl Flight {
                 cache,
             })
         };
-        self.cameras.iter().map(frame).collect()
+        self.cameras.iter().enumerate().map(frame).collect()
     }
 
     fn report(&self, file: &store::File, options: &Options, rows: Vec<Row>) -> Report {

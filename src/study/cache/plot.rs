@@ -126,9 +126,12 @@ fn draw_panel<B: DrawingBackend>(
     for row in &panel.rows {
         let Some(policy) = row.policy else { continue };
         let line = color(policy);
-        let asynchronous = matches!(row.loading, Some(Loading::Asynchronous { .. }));
-        let width = if asynchronous { 3 } else { 1 };
-        let name = format!("{} {}", policy.name(), if asynchronous { "async" } else { "sync" });
+        let width = match row.loading {
+            Some(Loading::Asynchronous { .. }) => 3 + 2 * row.prefetch() as u32,
+            _ => 1,
+        };
+        let name = row.loading.map_or("", |loading| loading.name(row.prefetch()));
+        let name = format!("{} {name}", policy.name());
         chart
             .draw_series(LineSeries::new(rates(row), line.stroke_width(width)))?
             .label(name)

@@ -2,7 +2,7 @@
 
 use super::{FrameTable, Paper, Trial};
 use crate::cache::policy::Replacement;
-use crate::cache::{CacheOptions, CacheStats, Cached, Loading};
+use crate::cache::{CacheOptions, CacheStats, Cached, Loading, Prefetch};
 use crate::geometry::Accuracy;
 use crate::study::text::{figure, grid, grouped};
 use serde::Serialize;
@@ -54,6 +54,12 @@ pub struct Row {
     pub held: usize,
     /// Bytes that were read.
     pub bytes_read: u64,
+    /// Blocks that came before they were needed.
+    pub prefetched: u64,
+    /// Those that were needed then; in a warm row, they may have come in the flight before.
+    pub prefetched_used: u64,
+    /// Those that made room before anybody needed them, likewise.
+    pub prefetched_unused: u64,
     /// Seconds that threads waited, added up.
     pub stalled: f64,
     /// The share of the time in which a loader had nothing to do.
@@ -95,6 +101,9 @@ impl Row {
             minimum: 0,
             held: 0,
             bytes_read: sum(|c| c.bytes_read),
+            prefetched: sum(|c| c.prefetched),
+            prefetched_used: sum(|c| c.prefetched_used),
+            prefetched_unused: sum(|c| c.prefetched_unused),
             stalled: frames.iter().map(|frame| frame.cache.stalled).sum(),
             loader_idle: 0.0,
             tile_p50: middle(|frame| frame.tile_p50),
@@ -132,13 +141,15 @@ impl Row {
         }
     }
 
+    /// Which blocks came before they were needed.
+    pub fn prefetch(&self) -> Prefetch {
+        self.cache.map_or(Prefetch::Off, |cache| cache.prefetch)
+    }
+
     /// In a few words.
     pub fn name(&self) -> String {
-        let loading = match self.loading {
-            None => return "resident".into(),
-            Some(Loading::Synchronous) => "sync",
-            Some(Loading::Asynchronous { .. }) => "async",
-        };
+        let Some(loading) = self.loading else { return "resident".into() };
+        let loading = loading.name(self.prefetch());
         let policy = self.policy.map_or("", Replacement::name);
         let pass = if self.warm { "warm" } else { "cold" };
         format!("{:.0} % {policy} {loading} {pass}", self.budget * 100.0)
@@ -232,6 +243,8 @@ impl fmt::Display for Report {
             "blocks read",
             "least",
             "MB read",
+            "ahead",
+            "used %",
             "stalled s",
             "loaders idle %",
             "tile ms p50",
@@ -244,11 +257,7 @@ impl fmt::Display for Report {
             lines.push(vec![
                 format!("{:.0} %", row.budget * 100.0),
                 row.policy.map_or("resident", Replacement::name).into(),
-                match row.loading {
-                    None => "-".into(),
-                    Some(Loading::Synchronous) => "sync".into(),
-                    Some(Loading::Asynchronous { .. }) => "async".into(),
-                },
+                row.loading.map_or("-", |loading| loading.name(row.prefetch())).into(),
                 if row.warm { "warm" } else { "cold" }.into(),
                 figure(row.rays_per_s * 1e-6),
                 format!("{:.2}", row.rays_per_s / resident),
@@ -257,6 +266,11 @@ impl fmt::Display for Report {
                 of(row.loads.to_string()),
                 of(row.minimum.to_string()),
                 of(format!("{:.1}", row.bytes_read as f64 * 1e-6)),
+                if row.prefetch() != Prefetch::Off { row.prefetched.to_string() } else { "-".into() },
+                match row.prefetched_used + row.prefetched_unused {
+                    0 => "-".into(),
+                    known => format!("{:.0}", 100.0 * row.prefetched_used as f64 / known as f64),
+                },
                 of(format!("{:.2}", row.stalled)),
                 of(format!("{:.0}", row.loader_idle * 100.0)),
                 format!("{:.2}", row.tile_p50 * 1e3),
@@ -268,7 +282,8 @@ impl fmt::Display for Report {
         writeln!(
             f,
             "\nleast: what the policy that knows the future would have read (Belady's MIN, on the uses of that \
-             flight)\nx paper: of the {:.0} thousand rays/s that the paper's fastest cache reached",
+             flight)\nahead: blocks that came before they were needed; used: of those whose fate is known, how \
+             many were needed then\nx paper: of the {:.0} thousand rays/s that the paper's fastest cache reached",
             self.paper.rays_per_s[1] * 1e-3
         )?;
         self.tables.iter().try_for_each(|table| write!(f, "\n{table}"))?;

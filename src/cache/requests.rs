@@ -1,0 +1,203 @@
+//! What loaders are asked for: what somebody waits for, and behind that what may be needed soon.
+//!
+//! ```text
+//! who needs a block -- need --> [ needed ]  first, all of them, as long as there is one
+//!                                              \
+//!                                               next --> loaders
+//!                                              /
+//! who looks ahead --- ahead --> [ ahead  ]  when nothing is needed, and some loaders stay free
+//! ```
+//!
+//! A block that is asked for ahead of need has not been asked for in the [directory](super::directory) before a
+//! loader takes it: who needs it meanwhile asks for it as if nobody had, and goes first.
+
+use super::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::collections::VecDeque;
+
+/// Requests of blocks that are needed, before who asks for another has to wait.
+const NEEDED: usize = 256;
+
+/// Requests ahead of need. When there are more, the oldest are forgotten: what they were for has begun.
+const AHEAD: usize = 256;
+
+/// What a loader is to read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// A block that somebody waits for, which the directory has said is absent.
+    Needed(u32),
+    /// One that may be needed soon. [`Requests::done_ahead`] is told when it is here, or not.
+    Ahead(u32),
+}
+
+/// The requests of one cache.
+#[derive(Debug)]
+pub struct Requests {
+    state: Mutex<State>,
+    /// There is something for a loader.
+    work: Condvar,
+    /// There is room for what is needed.
+    room: Condvar,
+    /// Nothing is being read ahead of need any more.
+    calm: Condvar,
+    /// Blocks that are read ahead of need at a time.
+    most: usize,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    needed: VecDeque<u32>,
+    ahead: VecDeque<u32>,
+    /// Blocks that are being read ahead of need.
+    reading: usize,
+    closed: bool,
+}
+
+impl Requests {
+    /// None yet; up to `most` blocks will be read ahead of need at a time.
+    pub fn new(most: usize) -> Self {
+        Self {
+            state: Mutex::default(),
+            work: Condvar::new(),
+            room: Condvar::new(),
+            calm: Condvar::new(),
+            most,
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Asks for a block that the directory has said is absent. Waits while there are very many.
+    pub fn need(&self, block: u32) {
+        let mut state = self.state();
+        while state.needed.len() >= NEEDED {
+            state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state.needed.push_back(block);
+        self.work.notify_one();
+    }
+
+    /// Asks for blocks ahead of need. Never waits.
+    pub fn ahead(&self, blocks: &[u32]) {
+        if self.most == 0 {
+            return;
+        }
+        let mut state = self.state();
+        for &block in blocks {
+            if state.ahead.contains(&block) {
+                continue;
+            }
+            if state.ahead.len() == AHEAD {
+                state.ahead.pop_front();
+            }
+            state.ahead.push_back(block);
+            if state.reading < self.most {
+                self.work.notify_one();
+            }
+        }
+    }
+
+    /// What a loader is to read next, when there is something; `None` at the end.
+    pub fn next(&self) -> Option<Request> {
+        let mut state = self.state();
+        loop {
+            if let Some(block) = state.needed.pop_front() {
+                self.room.notify_one();
+                return Some(Request::Needed(block));
+            }
+            if state.closed {
+                return None;
+            }
+            if state.reading < self.most
+                && let Some(block) = state.ahead.pop_front()
+            {
+                state.reading += 1;
+                return Some(Request::Ahead(block));
+            }
+            state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Said when a block that was to be read ahead of need is here, or is not going to be.
+    pub fn done_ahead(&self) {
+        let mut state = self.state();
+        state.reading -= 1;
+        // Who says so may go on with what is needed: another loader may have to take what is left.
+        if !state.ahead.is_empty() {
+            self.work.notify_one();
+        }
+        if state.reading == 0 {
+            self.calm.notify_all();
+        }
+    }
+
+    /// Forgets what was asked for ahead of need, and waits until nothing of it is being read.
+    pub fn forget_ahead(&self) {
+        let mut state = self.state();
+        state.ahead.clear();
+        while state.reading > 0 {
+            state = self.calm.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Waits until all that was asked for ahead of need has been read, or has not.
+    #[cfg(test)]
+    pub fn wait_ahead(&self) {
+        let mut state = self.state();
+        while state.reading > 0 || !state.ahead.is_empty() {
+            state = self.calm.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Ends the loaders once they have read all that is needed.
+    pub fn close(&self) {
+        let mut state = self.state();
+        state.closed = true;
+        state.ahead.clear();
+        self.work.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::thread;
+
+    #[test]
+    fn what_is_needed_goes_first_and_some_loaders_stay_free() {
+        let requests = Requests::new(2);
+        requests.ahead(&[1, 2, 3, 2]);
+        requests.need(7);
+        let next = || requests.next().expect("it is not closed");
+        assert_eq!([next(), next(), next()], [Request::Needed(7), Request::Ahead(1), Request::Ahead(2)]);
+        // Two are being read: the third has to wait, what is needed has not.
+        requests.need(8);
+        assert_eq!(next(), Request::Needed(8));
+        thread::scope(|scope| {
+            let third = scope.spawn(next);
+            requests.done_ahead();
+            assert_eq!(third.join().expect("no panic"), Request::Ahead(3));
+        });
+        requests.done_ahead();
+        requests.done_ahead();
+        requests.forget_ahead();
+        requests.ahead(&[4]);
+        requests.need(9);
+        requests.close();
+        assert_eq!((requests.next(), requests.next()), (Some(Request::Needed(9)), None), "4 is forgotten");
+    }
+
+    #[test]
+    fn the_oldest_are_forgotten_when_there_are_too_many() {
+        let requests = Requests::new(1);
+        let blocks: Vec<u32> = (0..AHEAD as u32 + 10).collect();
+        requests.ahead(&blocks);
+        assert_eq!(requests.next(), Some(Request::Ahead(10)));
+        requests.done_ahead();
+        let none = Requests::new(0);
+        none.ahead(&blocks);
+        none.close();
+        assert_eq!(none.next(), None);
+    }
+}
