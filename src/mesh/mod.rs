@@ -4,6 +4,7 @@
 //! repaired; [`generate`] makes models of any size; [`ply::write`] saves one.
 
 mod attributes;
+mod bits;
 mod check;
 mod color;
 pub mod generate;

@@ -1,5 +1,6 @@
 //! The policy of [`check`](super::super::check), pass by pass over lists in files.
 
+use super::super::bits::Bits;
 use super::super::check::{MAX_TRIANGLES, NonFinite, Unusable};
 use super::{SpooledColors, SpooledMesh, Whole};
 use crate::geometry::Aabb;
@@ -18,33 +19,6 @@ pub(super) enum Fault {
 impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {
         Self::Io(error)
-    }
-}
-
-/// A bit for each of many things.
-struct Bits(Vec<u64>);
-
-impl Bits {
-    fn new(count: usize) -> Self {
-        Self(vec![0; count.div_ceil(64)])
-    }
-
-    fn set(&mut self, place: usize) {
-        self.0[place / 64] |= 1 << (place % 64);
-    }
-
-    fn get(&self, place: usize) -> bool {
-        self.0[place / 64] >> (place % 64) & 1 == 1
-    }
-
-    /// For each word, how many bits are set before it.
-    fn before(&self) -> Vec<u32> {
-        let mut sum = 0;
-        let count = |word: &u64| {
-            sum += word.count_ones();
-            sum - word.count_ones()
-        };
-        self.0.iter().map(count).collect()
     }
 }
 
@@ -121,11 +95,8 @@ pub(super) fn check(
     }
     progress(0.7);
     if unused > 0 {
-        let before = used.before();
-        let renamed = |vertex: u32| {
-            let (word, bit) = (vertex as usize / 64, vertex % 64);
-            before[word] + (used.0[word] & ((1 << bit) - 1)).count_ones()
-        };
+        let numbers = used.numbers();
+        let renamed = |vertex: u32| numbers.of(vertex as usize);
         let mut list = Spool::new(folder)?;
         triangles.each(|_, some| {
             some.iter().for_each(|corners| list.push(corners.map(renamed)));

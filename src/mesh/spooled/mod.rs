@@ -1,6 +1,6 @@
 //! Meshes in files, for who cannot have them in memory.
 //!
-//! A PLY or OBJ file is read from its beginning to its end, and what it holds goes to files on the way (`whole`);
+//! A PLY, OBJ or STL file is read from its beginning to its end, and what it holds goes to files on the way (`whole`);
 //! checking it is some passes over these (`check`). What comes out is the mesh that [`read`](super::read()) gives,
 //! triangle by triangle.
 
@@ -10,7 +10,7 @@ mod whole;
 
 use super::lists::InFiles;
 use super::read::map;
-use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, obj, ply};
+use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, obj, ply, stl};
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::spool::{Spool, Spooled};
@@ -142,6 +142,7 @@ impl Announced {
 enum Format {
     Ply,
     Obj,
+    Stl,
 }
 
 impl Format {
@@ -150,13 +151,14 @@ impl Format {
         match () {
             () if ending.eq_ignore_ascii_case("ply") => Some(Self::Ply),
             () if ending.eq_ignore_ascii_case("obj") => Some(Self::Obj),
+            () if ending.eq_ignore_ascii_case("stl") => Some(Self::Stl),
             () => None,
         }
     }
 }
 
-/// How much a PLY file announces in its header, and how much is in an OBJ file, which is looked through for that;
-/// `None` for other files, which are read into memory only, and for what cannot be read.
+/// How much a PLY or binary STL file announces in its header, and how much is in an OBJ or ASCII STL file, which is
+/// looked through for that; `None` for other files, which are read into memory only, and for what cannot be read.
 pub fn announced(path: &Path) -> Option<Announced> {
     match Format::of(path)? {
         Format::Ply => {
@@ -171,11 +173,17 @@ pub fn announced(path: &Path) -> Option<Announced> {
             let behind = Behind::new(&bytes);
             Some(obj::count(&bytes, &|part| behind.release(part)))
         }
+        Format::Stl => {
+            let bytes = map(path).ok()?;
+            let behind = Behind::new(&bytes);
+            stl::announced(&bytes, &|part| behind.release(part))
+        }
     }
 }
 
-/// Reads a PLY or OBJ file to files in `folder`, which vanish with the mesh. `progress` is told now and then what part
-/// (0 to 1) is behind. Takes a bit for each vertex, some megabytes, and an OBJ file's materials.
+/// Reads a PLY, OBJ or STL file to files in `folder`, which vanish with the mesh. `progress` is told now and then what
+/// part (0 to 1) is behind. Takes a bit for each vertex, some megabytes, and an OBJ file's materials; of an STL file, a
+/// bit and a half for each corner, and some ten megabytes.
 ///
 /// # Errors
 /// As [`read`](super::read()), or there is no room in `folder`. Panics if it is a file of another kind.
@@ -185,11 +193,14 @@ pub fn read(path: &Path, folder: &Path, progress: &dyn Fn(f32)) -> Result<(Spool
     let lists = InFiles(folder.into());
     let mut report = ReadReport::default();
     let behind = Behind::new(&bytes);
+    let format = Format::of(path).expect("it is a kind that is read piece by piece");
+    // Welding an STL file's corners takes longer than reading them.
+    let reading = if matches!(format, Format::Stl) { 0.2 } else { 0.7 };
     let told = |part: f32| {
         behind.release(part);
-        progress(0.7 * part);
+        progress(reading * part);
     };
-    let whole = match Format::of(path).expect("it is a kind that is read piece by piece") {
+    let whole = match format {
         Format::Ply => {
             let raw = ply::parse_to(&lists, &bytes, &mut report, &told).map_err(malformed)?;
             Whole::of_ply(raw, &lists, &mut report)
@@ -197,6 +208,10 @@ pub fn read(path: &Path, folder: &Path, progress: &dyn Fn(f32)) -> Result<(Spool
         Format::Obj => {
             let raw = obj::parse_to(&lists, &bytes, path, &mut report, &told).map_err(malformed)?;
             Whole::of_obj(raw, &lists)
+        }
+        Format::Stl => {
+            let raw = stl::parse_to(&lists, &bytes, &mut report, &told).map_err(malformed)?;
+            Whole::of_stl(raw, &lists, &|part| progress(reading + (0.7 - reading) * part))
         }
     };
     drop(bytes);

@@ -3,7 +3,7 @@
 use super::SpooledColors;
 use crate::mesh::lists::{InFiles, Lists};
 use crate::mesh::ply::Shades;
-use crate::mesh::{Attributes, Colors, Image, ReadReport, color, obj, ply};
+use crate::mesh::{Attributes, Colors, Image, ReadReport, color, obj, ply, stl};
 use crate::spool::{Spool, Spooled};
 use glam::Vec3;
 use std::io;
@@ -52,6 +52,12 @@ impl Whole {
         };
         let (positions, triangles) = (raw.positions.finish()?, raw.triangles.finish()?);
         Ok(Self { positions, triangles, colors, attributes, images })
+    }
+
+    /// What an STL file held. `progress` is told now and then what part (0 to 1) is behind.
+    pub fn of_stl(raw: stl::Weld, lists: &InFiles, progress: &dyn Fn(f32)) -> io::Result<Self> {
+        let (positions, triangles) = raw.finish(lists, progress)?;
+        Ok(Self { positions, triangles, colors: default_color(), attributes: None, images: Vec::new() })
     }
 }
 

@@ -2,25 +2,36 @@
 //!
 //! Which of the two a file is, its size and its text tell: the first word is `solid` in many a binary file as well. A
 //! binary file is fixed records behind a count, which is believed only if the file is as long as it says. `stl_io`
-//! takes ASCII apart; `Lines` stands before it, because it knows one spelling alone, stops after the first of several
+//! takes ASCII apart; `text` stands before it, because it knows one spelling alone, stops after the first of several
 //! solids, and names no line when something is wrong.
 //!
-//! Corners at the same place become one vertex, so that neighbours share their edges to the bit. Facet normals and
-//! the attribute bytes of binary files are ignored: the order of its corners says which side of a facet is the front.
+//! Corners at the same place become one vertex, so that neighbours share their edges to the bit: in memory by a table
+//! of all vertices, in files by tables of a part of them each (`weld`). Facet normals and the attribute bytes of binary
+//! files are ignored: the order of its corners says which side of a facet is the front.
+
+mod text;
+mod weld;
 
 use super::check::MAX_TRIANGLES;
+use super::lists::{InFiles, no_room};
+use super::spooled::Announced;
 use super::{Mesh, ReadReport};
 use glam::Vec3;
 use std::cell::Cell;
 use std::collections::HashMap;
-use std::io::{self, BufRead, Read, Seek, SeekFrom};
+use std::io;
 use std::path::Path;
+use text::Lines;
+pub(super) use weld::Weld;
 
 /// Bytes before a binary file's first triangle: 80 of anything, then the count.
 const HEADER: usize = 84;
 
 /// Bytes of a binary file's triangle: a normal, three corners, two bytes of attributes.
 const TRIANGLE: usize = 50;
+
+/// Bytes of an ASCII file's triangle, at least.
+const TEXT_TRIANGLE: usize = 80;
 
 /// Triangles between two reports of progress.
 const TRIANGLES_PER_REPORT: usize = 1 << 16;
@@ -32,27 +43,77 @@ pub(super) fn parse(
     report: &mut ReadReport,
     progress: &dyn Fn(f32),
 ) -> Result<Mesh, String> {
-    let size = bytes.len() as u64;
-    match announced(bytes) {
-        // What ends exactly where its count says is binary, whatever it begins with.
-        Some((_, end)) if end == size => binary(&bytes[HEADER..], progress),
-        _ if is_text(bytes) => ascii(bytes, progress),
-        Some((_, end)) if end < size => {
-            report.trailing_bytes = size - end;
-            binary(&bytes[HEADER..end as usize], progress)
+    let mut soup = Soup::default();
+    walk(bytes, report, progress, |corners| soup.add(corners))?;
+    Ok(soup.mesh)
+}
+
+/// Parses an STL file's bytes, to lists in files, whose corners are yet to be welded.
+pub(super) fn parse_to(
+    lists: &InFiles,
+    bytes: &[u8],
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+) -> Result<Weld, String> {
+    let mut weld = Weld::new(lists, Form::of(bytes)?.most(bytes)).map_err(no_room)?;
+    walk(bytes, report, progress, |corners| weld.add(corners))?;
+    Ok(weld)
+}
+
+/// How much is in an STL file, as a binary one's header announces and an ASCII one's lines show; `None` of what is
+/// neither. How many of the corners are the same is not known before they are read: each counts as a vertex.
+pub(super) fn announced(bytes: &[u8], progress: &dyn Fn(f32)) -> Option<Announced> {
+    let triangles = match Form::of(bytes).ok()? {
+        Form::Binary { count, .. } => u64::from(count),
+        Form::Text => text::facets(bytes, progress),
+    };
+    Some(Announced { vertices: triangles.saturating_mul(3), triangles, attributes: false })
+}
+
+/// How a file is written.
+enum Form {
+    /// So many records from [`HEADER`] on, which end at a byte of the file.
+    Binary {
+        count: u32,
+        end: usize,
+    },
+    Text,
+}
+
+impl Form {
+    /// That of a file.
+    ///
+    /// # Errors
+    /// It has neither.
+    fn of(bytes: &[u8]) -> Result<Self, String> {
+        let size = bytes.len() as u64;
+        let binary = |count: u32, end: u64| Ok(Self::Binary { count, end: end as usize });
+        match header(bytes) {
+            // What ends exactly where its count says is binary, whatever it begins with.
+            Some((count, end)) if end == size => binary(count, end),
+            _ if is_text(bytes) => Ok(Self::Text),
+            Some((count, end)) if end < size => binary(count, end),
+            Some((count, end)) => Err(format!(
+                "neither an ASCII STL nor a whole binary one: its header announces {count} triangles, which end at \
+                 byte {end}, but the file has {size} bytes; export it again"
+            )),
+            None => Err(format!(
+                "no STL: it does not begin with \"solid\", and its {size} bytes are too few for a binary header"
+            )),
         }
-        Some((count, end)) => Err(format!(
-            "neither an ASCII STL nor a whole binary one: its header announces {count} triangles, which end at byte \
-             {end}, but the file has {size} bytes; export it again"
-        )),
-        None => Err(format!(
-            "no STL: it does not begin with \"solid\", and its {size} bytes are too few for a binary header"
-        )),
+    }
+
+    /// How many triangles it can have at most.
+    fn most(&self, bytes: &[u8]) -> usize {
+        match self {
+            Self::Binary { count, .. } => *count as usize,
+            Self::Text => bytes.len() / TEXT_TRIANGLE + 1,
+        }
     }
 }
 
 /// How many triangles a binary file has by its header, and where it ends then; `None` if it has none.
-fn announced(bytes: &[u8]) -> Option<(u32, u64)> {
+fn header(bytes: &[u8]) -> Option<(u32, u64)> {
     let count = u32::from_le_bytes(*bytes.get(80..HEADER)?.first_chunk()?);
     Some((count, HEADER as u64 + u64::from(count) * TRIANGLE as u64))
 }
@@ -70,34 +131,62 @@ fn contains(text: &[u8], word: &[u8]) -> bool {
     text.windows(word.len()).any(|piece| piece.eq_ignore_ascii_case(word))
 }
 
-fn binary(records: &[u8], progress: &dyn Fn(f32)) -> Result<Mesh, String> {
-    let mut soup = Soup::default();
-    let (records, _) = records.as_chunks::<TRIANGLE>();
+/// Gives all triangles in their order. Adding zero has made -0 what it equals.
+///
+/// # Errors
+/// It is no STL, and in which line if there are lines; or there are too many triangles.
+fn walk(
+    bytes: &[u8],
+    report: &mut ReadReport,
+    progress: &dyn Fn(f32),
+    mut give: impl FnMut([Vec3; 3]),
+) -> Result<(), String> {
+    let give = |corners: [Vec3; 3]| give(corners.map(|corner| corner + Vec3::ZERO));
+    match Form::of(bytes)? {
+        Form::Binary { count, .. } if count as usize > MAX_TRIANGLES => Err(too_many()),
+        Form::Binary { end, .. } => {
+            report.trailing_bytes = (bytes.len() - end) as u64;
+            binary(&bytes[..end], &|behind| progress(behind as f32 / bytes.len() as f32), give);
+            Ok(())
+        }
+        Form::Text => ascii(bytes, progress, give),
+    }
+}
+
+fn too_many() -> String {
+    format!("more than {MAX_TRIANGLES} triangles, the most that are possible; split the model")
+}
+
+/// The triangles of a binary file that ends with the last. `progress` is told how many bytes are behind.
+fn binary(bytes: &[u8], progress: &dyn Fn(usize), mut give: impl FnMut([Vec3; 3])) {
+    let (records, _) = bytes[HEADER..].as_chunks::<TRIANGLE>();
     for (i, record) in records.iter().enumerate() {
         if i % TRIANGLES_PER_REPORT == 0 {
-            progress(i as f32 / records.len() as f32);
+            progress(HEADER + i * TRIANGLE);
         }
         let (numbers, _) = record[12..48].as_chunks::<4>();
         let [x, y, z] =
             [0, 1, 2].map(|axis| [0, 3, 6].map(|corner| f32::from_le_bytes(numbers[corner + axis])));
-        soup.add([0, 1, 2].map(|corner| Vec3::new(x[corner], y[corner], z[corner])))?;
+        give([0, 1, 2].map(|corner| Vec3::new(x[corner], y[corner], z[corner])));
     }
-    Ok(soup.mesh)
 }
 
-fn ascii(bytes: &[u8], progress: &dyn Fn(f32)) -> Result<Mesh, String> {
+fn ascii(bytes: &[u8], progress: &dyn Fn(f32), mut give: impl FnMut([Vec3; 3])) -> Result<(), String> {
     let line = Cell::new(0);
     let behind = Cell::new(0);
     let mut lines = Lines::of(bytes, &line, &behind);
     let at_line = |error: io::Error| format!("line {}: {error}", line.get());
-    let mut soup = Soup::default();
     for (i, triangle) in stl_io::create_stl_reader(&mut lines).map_err(at_line)?.enumerate() {
         if i % TRIANGLES_PER_REPORT == 0 {
             progress(behind.get() as f32 / bytes.len() as f32);
         }
-        soup.add(triangle.map_err(at_line)?.vertices.map(|vertex| Vec3::from_array(vertex.0)))?;
+        let corners = triangle.map_err(at_line)?.vertices;
+        if i == MAX_TRIANGLES {
+            return Err(too_many());
+        }
+        give(corners.map(|vertex| Vec3::from_array(vertex.0)));
     }
-    Ok(soup.mesh)
+    Ok(())
 }
 
 /// Triangles that find their common vertices.
@@ -109,98 +198,15 @@ struct Soup {
 }
 
 impl Soup {
-    fn add(&mut self, corners: [Vec3; 3]) -> Result<(), String> {
+    fn add(&mut self, corners: [Vec3; 3]) {
         let Self { mesh, numbers } = self;
-        if mesh.triangles.len() == MAX_TRIANGLES {
-            return Err(format!(
-                "more than {MAX_TRIANGLES} triangles, the most that are possible; split the model"
-            ));
-        }
-        // Adding zero makes -0 what it equals. There are fewer than 3 MAX_TRIANGLES vertices, which 32 bits count.
-        mesh.triangles.push(corners.map(|corner| corner + Vec3::ZERO).map(|corner| {
+        // There are not more than 3 MAX_TRIANGLES vertices, which 32 bits count.
+        mesh.triangles.push(corners.map(|corner| {
             *numbers.entry(corner.to_array().map(f32::to_bits)).or_insert_with(|| {
                 mesh.positions.push(corner);
                 mesh.positions.len() as u32 - 1
             })
         }));
-        Ok(())
-    }
-}
-
-/// An ASCII file, line by line, as `stl_io` likes it: in small letters, as UTF-8, and all solids as one.
-struct Lines<'a> {
-    bytes: &'a [u8],
-    rest: &'a [u8],
-    /// The number, from 1, of the line that was handed out last: `stl_io` asks for no more than it needs, as each
-    /// call to `read` gives it one line.
-    line: &'a Cell<u64>,
-    /// Bytes of the file that were handed out.
-    behind: &'a Cell<usize>,
-    /// The cleaned line, and how much of it was read.
-    out: Vec<u8>,
-    read: usize,
-    /// Whether the line that opens and the one that closes the only solid were handed out.
-    opened: bool,
-    closed: bool,
-}
-
-impl<'a> Lines<'a> {
-    fn of(bytes: &'a [u8], line: &'a Cell<u64>, behind: &'a Cell<usize>) -> Self {
-        line.set(0);
-        behind.set(0);
-        Self { bytes, rest: bytes, line, behind, out: Vec::new(), read: 0, opened: false, closed: false }
-    }
-
-    /// Fills `out` with the next line; leaves it empty at the end.
-    fn refill(&mut self) {
-        self.out.clear();
-        self.read = 0;
-        if !self.opened {
-            self.opened = true;
-            self.out.extend_from_slice(b"solid \n");
-        }
-        while self.out.is_empty() && !self.rest.is_empty() {
-            let start = self.rest;
-            // On a slice this never fails.
-            let length = self.rest.skip_until(b'\n').unwrap_or(start.len());
-            self.line.set(self.line.get() + 1);
-            self.behind.set(self.behind.get() + length);
-            let line = start[..length].trim_ascii();
-            let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            if !(word.is_empty()
-                || word.eq_ignore_ascii_case(b"solid")
-                || word.eq_ignore_ascii_case(b"endsolid"))
-            {
-                self.out.extend_from_slice(String::from_utf8_lossy(line).to_ascii_lowercase().as_bytes());
-                self.out.push(b'\n');
-            }
-        }
-        if self.out.is_empty() && !self.closed {
-            self.closed = true;
-            self.out.extend_from_slice(b"endsolid\n");
-        }
-    }
-}
-
-impl Read for Lines<'_> {
-    fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
-        if self.read == self.out.len() {
-            self.refill();
-        }
-        let count = (&self.out[self.read..]).read(buf)?;
-        self.read += count;
-        Ok(count)
-    }
-}
-
-impl Seek for Lines<'_> {
-    /// Back to the start, where `stl_io` goes when it has looked at the first line; nowhere else.
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if to != SeekFrom::Start(0) {
-            return Err(io::ErrorKind::Unsupported.into());
-        }
-        *self = Self::of(self.bytes, self.line, self.behind);
-        Ok(0)
     }
 }
 
@@ -208,9 +214,23 @@ impl Seek for Lines<'_> {
 mod tests {
     use super::*;
 
+    /// What a file's bytes become, in memory and in files alike.
     fn read(bytes: impl AsRef<[u8]>) -> Result<(Mesh, ReadReport), String> {
+        let bytes = bytes.as_ref();
         let mut report = ReadReport::default();
-        parse(bytes.as_ref(), Path::new("model.stl"), &mut report, &|_| ()).map(|mesh| (mesh, report))
+        let read =
+            parse(bytes, Path::new("model.stl"), &mut report, &|_| ()).map(|mesh| (mesh, report.clone()));
+
+        let lists = InFiles(std::env::temp_dir());
+        let mut report = ReadReport::default();
+        let in_files = parse_to(&lists, bytes, &mut report, &|_| ()).map(|weld| {
+            let (positions, triangles) = weld.finish(&lists, &|_| ()).expect("room");
+            let positions = positions.to_vec().expect("readable");
+            let triangles = triangles.to_vec().expect("readable");
+            (Mesh { positions, triangles, ..Mesh::default() }, report)
+        });
+        assert_eq!(in_files, read);
+        read
     }
 
     /// Two triangles of a square.
@@ -245,6 +265,16 @@ mod tests {
         assert!(mesh.positions.iter().all(|place| place.is_negative_bitmask() == 0), "no -0");
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(report, ReadReport::default());
+    }
+
+    #[test]
+    fn triangles_are_counted_before_they_are_read() {
+        let count = |bytes: &[u8]| announced(bytes, &|_| ()).map(|found| (found.triangles, found.vertices));
+        let (binary, text) = (binary_file("solid", &SQUARE), ascii_file(&SQUARE));
+        assert_eq!(count(&binary), Some((2, 6)));
+        assert_eq!(count(text.as_bytes()), Some((2, 6)));
+        assert_eq!(count(text.to_uppercase().as_bytes()), Some((2, 6)));
+        assert_eq!(count(&binary[..binary.len() - 1]), None, "neither of both");
     }
 
     #[test]
