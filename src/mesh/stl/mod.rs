@@ -324,6 +324,7 @@ mod tests {
             (file.replacen("vertex 1", "vertex nan", 1), "line 5", "finite"),
             (file.replacen("  endloop\n", "   vertex 0 0 0\n", 1), "line 7", "endloop"),
             (file.replacen("facet normal", "facette", 1), "line 2", "facet"),
+            (file.replacen("endloop\n", &"x ".repeat(3000), 1), "line 7", "bytes are more than 4096"),
             (file[..file.len() / 2].to_owned(), "line ", ""),
         ] {
             let error = read(broken).expect_err("this is no STL");

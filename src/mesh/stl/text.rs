@@ -3,6 +3,9 @@
 use std::cell::Cell;
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
+/// The most bytes of a line: no file needs as many, and one without line ends may be larger than memory.
+const LONGEST: usize = 1 << 12;
+
 /// Bytes between two reports of progress.
 const BYTES_PER_REPORT: usize = 1 << 22;
 
@@ -64,7 +67,10 @@ impl<'a> Lines<'a> {
     }
 
     /// Fills `out` with the next line; leaves it empty at the end.
-    fn refill(&mut self) {
+    ///
+    /// # Errors
+    /// A line is too long.
+    fn refill(&mut self) -> io::Result<()> {
         self.out.clear();
         self.read = 0;
         if !self.opened {
@@ -77,6 +83,10 @@ impl<'a> Lines<'a> {
             self.behind.set(self.behind.get() + line.len());
             let (line, word) = (line.trim_ascii(), first_word(line));
             if !(word.is_empty() || is(word, b"solid") || is(word, b"endsolid")) {
+                if line.len() > LONGEST {
+                    let message = format!("its {} bytes are more than {LONGEST}", line.len());
+                    return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+                }
                 self.out.extend_from_slice(String::from_utf8_lossy(line).to_ascii_lowercase().as_bytes());
                 self.out.push(b'\n');
             }
@@ -85,13 +95,14 @@ impl<'a> Lines<'a> {
             self.closed = true;
             self.out.extend_from_slice(b"endsolid\n");
         }
+        Ok(())
     }
 }
 
 impl Read for Lines<'_> {
     fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
         if self.read == self.out.len() {
-            self.refill();
+            self.refill()?;
         }
         let count = (&self.out[self.read..]).read(buf)?;
         self.read += count;
