@@ -21,6 +21,16 @@ impl Bits {
         self.0[place / 64] >> (place % 64) & 1 == 1
     }
 
+    /// Where they are set, rising.
+    pub fn set_places(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().enumerate().flat_map(|(word, &bits)| {
+            // Each time the lowest is taken off.
+            let lowest = |bits: &u64| Some(bits & (bits - 1)).filter(|&rest| rest != 0);
+            let rests = std::iter::successors(Some(bits).filter(|&bits| bits != 0), lowest);
+            rests.map(move |rest| word * 64 + rest.trailing_zeros() as usize)
+        })
+    }
+
     /// A number for each one that is set: half as much memory again. There are at most `u32::MAX`.
     pub fn numbers(&self) -> Numbers<'_> {
         let mut sum = 0;
@@ -57,10 +67,12 @@ mod tests {
         let places = [0, 1, 5, 63, 64, 127, 128, 640, 699];
         let mut bits = Bits::new(700);
         places.iter().for_each(|&place| bits.set(place));
+        assert_eq!(bits.set_places().collect::<Vec<_>>(), places);
         let numbers = bits.numbers();
         for place in 0..700 {
             assert_eq!(bits.get(place), places.contains(&place), "{place}");
             assert_eq!(numbers.of(place) as usize, places.iter().filter(|&&set| set < place).count());
         }
+        assert_eq!(Bits::new(0).set_places().next(), None);
     }
 }

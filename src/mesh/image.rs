@@ -1,5 +1,6 @@
 //! Pictures that materials name, and where their bytes are.
 
+use crate::spool::Spooled;
 use std::borrow::Cow;
 use std::fmt;
 use std::fs;
@@ -36,7 +37,7 @@ pub enum ImageSource {
     File(PathBuf),
     /// In a model's file: the bytes of a picture file.
     Bytes(Arc<[u8]>),
-    /// The same in a scene file, where they stay until they are read.
+    /// The same in a file that is open, where they stay until they are read.
     Packed(Arc<dyn Packed>),
     /// Nowhere: this is what is wrong. One plain colour takes its place.
     Missing(String),
@@ -51,6 +52,16 @@ pub trait Packed: fmt::Debug + Send + Sync {
     /// # Errors
     /// They cannot be read, or are damaged.
     fn read(&self) -> io::Result<Vec<u8>>;
+}
+
+impl Packed for Spooled<u8> {
+    fn bytes(&self) -> u64 {
+        self.len() as u64
+    }
+
+    fn read(&self) -> io::Result<Vec<u8>> {
+        self.to_vec()
+    }
 }
 
 /// The most bytes that a picture's file may have.
@@ -90,7 +101,7 @@ fn read_file(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 impl PartialEq for ImageSource {
-    /// Pictures in scene files are the same if they are the same place in the same open file.
+    /// Pictures in open files are the same if they are the same place in the same open file.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::File(one), Self::File(other)) => one == other,

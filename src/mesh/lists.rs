@@ -1,9 +1,15 @@
 //! The lists that a reader fills: in memory, or in files where the model is larger than that.
 
-use crate::spool::Spool;
+use super::ImageSource;
+use crate::files::write_at;
+use crate::spool::{Spool, Spooled};
 use bytemuck::Pod;
+use std::cell::{Cell, OnceCell};
+use std::collections::TryReserveError;
+use std::fs::File;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Where a reader's lists are kept.
 pub(super) trait Lists {
@@ -15,6 +21,12 @@ pub(super) trait Lists {
     /// # Errors
     /// No file can be made.
     fn list<T: Pod>(&self) -> io::Result<Self::Of<T>>;
+
+    /// Keeps a copy of a picture file's bytes.
+    ///
+    /// # Errors
+    /// There is no room.
+    fn picture(&self, bytes: &[u8]) -> io::Result<ImageSource>;
 }
 
 /// A list that grows at its end.
@@ -26,7 +38,12 @@ pub(super) trait List<T: Copy> {
     fn push(&mut self, value: T);
 
     /// Says that so many values will come.
-    fn expect(&mut self, _count: usize) {}
+    ///
+    /// # Errors
+    /// There is not enough memory for them.
+    fn expect(&mut self, _count: usize) -> Result<(), TryReserveError> {
+        Ok(())
+    }
 
     /// Adds a value so many times.
     fn push_times(&mut self, value: T, times: usize) {
@@ -53,6 +70,10 @@ impl Lists for InMemory {
     fn list<T: Pod>(&self) -> io::Result<Vec<T>> {
         Ok(Vec::new())
     }
+
+    fn picture(&self, bytes: &[u8]) -> io::Result<ImageSource> {
+        Ok(ImageSource::Bytes(bytes.into()))
+    }
 }
 
 impl<T: Copy> List<T> for Vec<T> {
@@ -65,19 +86,51 @@ impl<T: Copy> List<T> for Vec<T> {
         self.push(value);
     }
 
-    fn expect(&mut self, count: usize) {
-        self.reserve_exact(count);
+    fn expect(&mut self, count: usize) -> Result<(), TryReserveError> {
+        self.try_reserve_exact(count)
     }
 }
 
-/// Lists in files in this folder.
-pub(super) struct InFiles(pub PathBuf);
+/// Lists in files in a folder.
+pub(super) struct InFiles {
+    folder: PathBuf,
+    /// All pictures are in one file, as there may be more of them than files can be open.
+    pictures: OnceCell<Arc<File>>,
+    /// Where the next picture begins.
+    end: Cell<u64>,
+}
+
+impl InFiles {
+    /// In this folder.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), pictures: OnceCell::new(), end: Cell::new(0) }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
 
 impl Lists for InFiles {
     type Of<T: Pod> = Spool<T>;
 
     fn list<T: Pod>(&self) -> io::Result<Spool<T>> {
-        Spool::new(&self.0)
+        Spool::new(&self.folder)
+    }
+
+    fn picture(&self, bytes: &[u8]) -> io::Result<ImageSource> {
+        let file = match self.pictures.get() {
+            Some(file) => Arc::clone(file),
+            None => {
+                let file = Arc::new(tempfile::tempfile_in(&self.folder)?);
+                Arc::clone(self.pictures.get_or_init(|| file))
+            }
+        };
+        let start = self.end.get();
+        write_at(&file, bytes, start)?;
+        self.end.set(start + bytes.len() as u64);
+        Ok(ImageSource::Packed(Arc::new(Spooled::<u8>::in_file(file, start, bytes.len()))))
     }
 }
 

@@ -167,19 +167,43 @@ pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Loaded> {
 /// What makes a mesh, not checked yet, of a file's bytes.
 type Parser = fn(&[u8], &Path, &mut ReadReport, &dyn Fn(f32)) -> Result<Mesh, String>;
 
-/// The parser that a path's ending asks for.
-fn parser(path: &Path) -> Result<Parser> {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    match ending.as_deref() {
-        Some("obj") => Ok(obj::parse),
-        Some("ply") => Ok(ply::parse),
-        Some("stl") => Ok(stl::parse),
-        Some("gltf" | "glb") => Ok(gltf::parse),
-        _ => {
-            let expected = "a model is a .obj, .ply, .stl, .gltf or .glb file";
-            Err(Error::UnknownFormat { path: path.into(), expected })
+/// The kinds of model files.
+#[derive(Clone, Copy)]
+pub(super) enum Format {
+    Obj,
+    Ply,
+    Stl,
+    Gltf,
+}
+
+impl Format {
+    /// The one that a path's ending says.
+    ///
+    /// # Errors
+    /// It says none of them.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("obj") => Ok(Self::Obj),
+            Some("ply") => Ok(Self::Ply),
+            Some("stl") => Ok(Self::Stl),
+            Some("gltf" | "glb") => Ok(Self::Gltf),
+            _ => {
+                let expected = "a model is a .obj, .ply, .stl, .gltf or .glb file";
+                Err(Error::UnknownFormat { path: path.into(), expected })
+            }
         }
     }
+}
+
+/// The parser that a path's ending asks for.
+fn parser(path: &Path) -> Result<Parser> {
+    Ok(match Format::of(path)? {
+        Format::Obj => obj::parse,
+        Format::Ply => ply::parse,
+        Format::Stl => stl::parse,
+        Format::Gltf => gltf::parse,
+    })
 }
 
 fn parse_with(parser: Parser, bytes: &[u8], path: &Path, progress: &dyn Fn(f32)) -> Result<Loaded> {

@@ -2,7 +2,7 @@
 
 use super::common::Place;
 use super::report;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Sees to it that two scene files are the same but for `meta` and the order of sections.
 fn same_sections(place: &Place, one: &str, other: &str) {
@@ -126,6 +126,63 @@ fn solid_hills(place: &Place, side: usize) {
     place.write("hills.stl", file);
 }
 
+/// A GLB of hills, there twice, with texture coordinates, normals, materials, and a picture in its buffer. One of its
+/// two primitives has all vertices, the other those of the first rows.
+fn twin_hills(place: &Place, side: usize) {
+    let corners = || (0..=side).flat_map(|z| (0..=side).map(move |x| (x, z)));
+    let mut carried: Vec<u8> = Vec::new();
+    let (mut views, mut accessors) = (Vec::new(), Vec::new());
+    let mut add = |bytes: Vec<u8>, kind: &str, component: u32, size: usize| {
+        views.push(json!({ "buffer": 0, "byteOffset": carried.len(), "byteLength": bytes.len() }));
+        let count = bytes.len() / size;
+        accessors.push(json!({ "bufferView": accessors.len(), "componentType": component, "count": count, "type": kind }));
+        carried.extend(bytes);
+    };
+    let floats = |values: Vec<f32>| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let places = corners().flat_map(|(x, z)| [x as f32, height(x, z), z as f32]).collect();
+    add(floats(places), "VEC3", 5126, 12);
+    add(
+        floats(corners().flat_map(|(x, z)| [x as f32 % 7.0 - 3.0, 9.0, z as f32 % 5.0]).collect()),
+        "VEC3",
+        5126,
+        12,
+    );
+    add(floats(corners().flat_map(|(x, z)| [x as f32 / 8.0, z as f32 / 8.0]).collect()), "VEC2", 5126, 8);
+    let squares = |rows: usize| (0..rows).flat_map(move |z| (0..side).map(move |x| z * (side + 1) + x));
+    let faces = |rows: usize| {
+        let face = |a: usize| [a, a + side + 1, a + side + 2, a, a + side + 2, a + 1];
+        squares(rows).flat_map(face).flat_map(|index| (index as u32).to_le_bytes()).collect()
+    };
+    add(faces(side), "SCALAR", 5125, 4);
+    add(faces(side / 9), "SCALAR", 5125, 4);
+    add(b"no picture".to_vec(), "SCALAR", 5121, 1);
+    carried.resize(carried.len().next_multiple_of(4), 0);
+
+    let attributes = json!({ "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2 });
+    let textured = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+    let document = json!({
+        "asset": { "version": "2.0" },
+        "nodes": [{ "mesh": 0 }, { "mesh": 0, "translation": [0, 50, 1], "scale": [1, -1, 0.5] }],
+        "meshes": [{ "primitives": [
+            { "attributes": attributes, "indices": 3, "material": 0 },
+            { "attributes": attributes, "indices": 4 },
+        ] }],
+        "materials": [textured],
+        "textures": [{ "source": 0 }],
+        "images": [{ "bufferView": 5, "mimeType": "image/png" }],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{ "byteLength": carried.len() }],
+    });
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let word = |number: usize| (number as u32).to_le_bytes();
+    let length = 12 + 8 + text.len() + 8 + carried.len();
+    let header = [*b"glTF", word(2), word(length), word(text.len()), *b"JSON"].concat();
+    let carried = [&word(carried.len())[..], b"BIN\0", &carried].concat();
+    place.write("hills.glb", [header, text, carried].concat());
+}
+
 /// Builds a model in memory and piece by piece, within so many MiB, and sees to it that both give the same.
 fn same_both_ways(place: &Place, model: &str, mebibytes: u64) {
     let whole = report(place, &format!("build {model} -o whole.rpk"));
@@ -158,4 +215,12 @@ fn stl_models_larger_than_the_memory_given_are_built_piece_by_piece() {
     solid_hills(&place, 440);
     same_both_ways(&place, "hills.stl", 120);
     assert_eq!(place.files(), ["hills.stl", "parts.rpk", "whole.rpk"]);
+}
+
+#[test]
+fn glb_models_larger_than_the_memory_given_are_built_piece_by_piece() {
+    let place = Place::new();
+    twin_hills(&place, 300);
+    same_both_ways(&place, "hills.glb", 120);
+    assert_eq!(place.files(), ["hills.glb", "parts.rpk", "whole.rpk"]);
 }

@@ -23,9 +23,8 @@ use std::time::Instant;
 /// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
 /// become one scene. Primitive ids run on from model to model in the order in which they are named.
 ///
-/// With --memory, a PLY, OBJ, STL or .rpk model that is larger than that, with its tree, is read and built piece by
-/// piece: the same scene, in more time. What waits for its turn lies in files beside the scene file, and goes with the
-/// command.
+/// With --memory, a model that is larger than that, with its tree, is read and built piece by piece: the same scene, in
+/// more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
     /// The models: .obj, .ply, .stl, .gltf or .glb, or .rpk scene files, whose trees are built anew

@@ -5,13 +5,15 @@
 //! and as single elements are wanted, not all in a row, the crate's iterators are left out.
 
 use super::buffers::Buffers;
+use super::view::View;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::accessor::sparse::Sparse;
 use gltf::{Accessor, Document};
 use std::cmp::Ordering;
+use std::ops::Range;
 
 /// An accessor's elements, all of which lie in their buffers.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Elements<'a> {
     /// How many there are.
     pub count: usize,
@@ -20,20 +22,20 @@ pub(super) struct Elements<'a> {
     /// Bytes of one.
     size: usize,
     /// Where they are, and bytes from one to the next; without, they are zeros.
-    base: Option<(&'a [u8], usize)>,
+    base: Option<(View<'a>, usize)>,
     /// Those that are others.
     changed: Option<Changed<'a>>,
 }
 
 /// Elements that a sparse accessor changes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone)]
 struct Changed<'a> {
     /// Which ones, rising, in little-endian numbers of `step` bytes. They stay bytes: many primitives may name the
     /// same accessor.
-    numbers: &'a [u8],
+    numbers: View<'a>,
     step: usize,
     /// What they are, without gaps.
-    values: &'a [u8],
+    values: View<'a>,
 }
 
 impl Changed<'_> {
@@ -42,7 +44,7 @@ impl Changed<'_> {
     }
 
     fn number(&self, at: usize) -> u32 {
-        unsigned(&self.numbers[at * self.step..][..self.step])
+        unsigned(self.numbers.look(at * self.step, self.step))
     }
 
     /// Where an element is among those that are changed.
@@ -68,7 +70,7 @@ impl<'a> Elements<'a> {
     pub fn new(
         accessor: &Accessor<'_>,
         document: &Document,
-        buffers: &'a Buffers<'_>,
+        buffers: &'a Buffers<'a>,
         (dimensions, kinds): (&[Dimensions], &[DataType]),
         what: &str,
     ) -> Result<Self, String> {
@@ -88,10 +90,11 @@ impl<'a> Elements<'a> {
                 if stride < size {
                     return Err(fault(format!("elements of {size} bytes every {stride} bytes")));
                 }
-                let bytes = buffers.view(view.value()).map_err(fault)?;
-                let range = range(bytes, json.byte_offset.unwrap_or_default().0, count, stride, size);
+                let view = buffers.view(view.value()).map_err(fault)?;
+                let range = range(json.byte_offset.unwrap_or_default().0, count, stride, size);
+                let view = range.and_then(|range| view.part(range));
                 Some((
-                    range.ok_or_else(|| fault(format!("{count} elements are more than its view holds")))?,
+                    view.ok_or_else(|| fault(format!("{count} elements are more than its view holds")))?,
                     stride,
                 ))
             }
@@ -113,9 +116,9 @@ impl<'a> Elements<'a> {
         if let Some(changed) = &self.changed
             && let Some(at) = changed.find(index)
         {
-            return Some(&changed.values[at * self.size..][..self.size]);
+            return Some(changed.values.look(at * self.size, self.size));
         }
-        self.base.map(|(bytes, stride)| &bytes[index as usize * stride..][..self.size])
+        self.base.as_ref().map(|(view, stride)| view.look(index as usize * stride, self.size))
     }
 
     /// An element's first `N` numbers. Panics if `index` is out of range, or there are fewer.
@@ -133,18 +136,18 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The bytes from the first to the last of `count` elements; `None` if they are not all there.
-fn range(bytes: &[u8], offset: u64, count: usize, stride: usize, size: usize) -> Option<&[u8]> {
-    let Some(before_last) = count.checked_sub(1) else { return Some(&[]) };
+/// Where the bytes from the first to the last of `count` elements are; `None` if no file has so many.
+fn range(offset: u64, count: usize, stride: usize, size: usize) -> Option<Range<usize>> {
+    let Some(before_last) = count.checked_sub(1) else { return Some(0..0) };
     let start = usize::try_from(offset).ok()?;
     let end = before_last.checked_mul(stride)?.checked_add(size)?.checked_add(start)?;
-    bytes.get(start..end)
+    Some(start..end)
 }
 
 /// The elements that a sparse accessor changes.
 fn changed<'a>(
     sparse: &Sparse,
-    buffers: &'a Buffers<'_>,
+    buffers: &'a Buffers<'a>,
     count: usize,
     size: usize,
 ) -> Result<Changed<'a>, String> {
@@ -155,9 +158,13 @@ fn changed<'a>(
         gltf::json::validation::Checked::Invalid => return Err("sparse indices of no known type".into()),
     };
     let numbers = buffers.view(sparse.indices.buffer_view.value())?;
-    let numbers = range(numbers, sparse.indices.byte_offset.0, changes, step, step).ok_or_else(short)?;
+    let numbers = range(sparse.indices.byte_offset.0, changes, step, step)
+        .and_then(|range| numbers.part(range))
+        .ok_or_else(short)?;
     let values = buffers.view(sparse.values.buffer_view.value())?;
-    let values = range(values, sparse.values.byte_offset.0, changes, size, size).ok_or_else(short)?;
+    let values = range(sparse.values.byte_offset.0, changes, size, size)
+        .and_then(|range| values.part(range))
+        .ok_or_else(short)?;
     let changed = Changed { numbers, step, values };
     let in_range = changes == 0 || (changed.number(changes - 1) as usize) < count;
     if !in_range || !(0..changes).is_sorted_by(|&a, &b| changed.number(a) < changed.number(b)) {
@@ -205,12 +212,11 @@ mod tests {
 
     #[test]
     fn ranges_do_not_overflow() {
-        let bytes = [0; 24];
-        assert_eq!(range(&bytes, 0, 2, 12, 12).map(<[u8]>::len), Some(24));
-        assert_eq!(range(&bytes, 4, 2, 12, 8).map(<[u8]>::len), Some(20));
-        assert_eq!(range(&bytes, 0, 0, 12, 12), Some(&[][..]));
-        for (offset, count) in [(1, 2), (0, 3), (0, usize::MAX), (u64::MAX, 1), (24, 1)] {
-            assert_eq!(range(&bytes, offset, count, 12, 12), None, "{offset} {count}");
+        assert_eq!(range(0, 2, 12, 12), Some(0..24));
+        assert_eq!(range(4, 2, 12, 8), Some(4..24));
+        assert_eq!(range(7, 0, 12, 12), Some(0..0));
+        for (offset, count) in [(0, usize::MAX), (u64::MAX, 1), (1 << 63, usize::MAX / 12)] {
+            assert_eq!(range(offset, count, 12, 12), None, "{offset} {count}");
         }
     }
 }

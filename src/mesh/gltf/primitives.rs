@@ -2,6 +2,7 @@
 
 use super::buffers::Buffers;
 use super::elements::Elements;
+use crate::mesh::bits::{Bits, Numbers};
 use crate::mesh::{MAX_TRIANGLES, ReadReport};
 use gltf::accessor::DataType::{F32, I8, I16, U8, U16, U32};
 use gltf::accessor::{DataType, Dimensions};
@@ -9,7 +10,6 @@ use gltf::mesh::Mode;
 use gltf::{Document, Semantic};
 
 /// A part of a mesh: triangles of one material.
-#[derive(Clone, Debug)]
 pub(super) struct Part<'a> {
     /// Which corners belong together.
     mode: Mode,
@@ -43,29 +43,23 @@ impl<'a> Part<'a> {
     pub fn read(
         primitive: &gltf::Primitive<'_>,
         document: &Document,
-        buffers: &'a Buffers<'_>,
+        buffers: &'a Buffers<'a>,
         set: impl Fn(usize) -> u32,
         report: &mut ReadReport,
     ) -> Result<Option<Self>, String> {
-        let corners = primitive.indices().or(primitive.get(&Semantic::Positions));
-        let corners = corners.map_or(0, |accessor| accessor.count());
-        let mode = primitive.mode();
-        let triangles = match mode {
-            Mode::Triangles => corners / 3,
-            Mode::TriangleStrip | Mode::TriangleFan => corners.saturating_sub(2),
-            Mode::Points => {
-                report.points = report.points.saturating_add(corners as u64);
-                return Ok(None);
-            }
-            Mode::Lines | Mode::LineLoop | Mode::LineStrip => {
-                let lines = match mode {
-                    Mode::Lines => corners / 2,
-                    Mode::LineLoop => corners,
-                    _ => corners.saturating_sub(1),
-                };
-                report.lines = report.lines.saturating_add(lines as u64);
-                return Ok(None);
-            }
+        let (mode, corners) = (primitive.mode(), corners(primitive));
+        let Some(triangles) = triangles(mode, corners) else {
+            let lines = match mode {
+                Mode::Lines => corners / 2,
+                Mode::LineLoop => corners,
+                _ => corners.saturating_sub(1),
+            };
+            let (counted, count) = match mode {
+                Mode::Points => (&mut report.points, corners),
+                _ => (&mut report.lines, lines),
+            };
+            *counted = counted.saturating_add(count as u64);
+            return Ok(None);
         };
         if mode == Mode::Triangles {
             if !corners.is_multiple_of(3) {
@@ -110,11 +104,11 @@ impl<'a> Part<'a> {
         Ok(Some(part))
     }
 
-    /// The first and the last vertex that triangles use; `None` if there are none.
+    /// The vertices that triangles use; `None` if there are none.
     ///
     /// # Errors
     /// One is not among the positions.
-    pub fn vertices(&self) -> Result<Option<(u32, u32)>, String> {
+    pub fn vertices(&self) -> Result<Option<Vertices>, String> {
         let Some(last_corner) = self.corners().checked_sub(1) else { return Ok(None) };
         let (first, last) = match &self.indices {
             None => (0, last_corner),
@@ -122,13 +116,16 @@ impl<'a> Part<'a> {
                 .map(|corner| indices.index(corner))
                 .fold((u32::MAX, 0), |(first, last), index| (first.min(index), last.max(index))),
         };
-        match last as usize >= self.positions.count {
-            true => Err(format!(
-                "index {last} is out of range, a primitive has {} vertices",
-                self.positions.count
-            )),
-            false => Ok(Some((first, last))),
+        if last as usize >= self.positions.count {
+            let vertices = self.positions.count;
+            return Err(format!("index {last} is out of range, a primitive has {vertices} vertices"));
         }
+        let mut used = Bits::new((last - first) as usize + 1);
+        for corner in 0..=last_corner {
+            let vertex = self.indices.as_ref().map_or(corner, |indices| indices.index(corner));
+            used.set((vertex - first) as usize);
+        }
+        Ok(Some(Vertices { first, used }))
     }
 
     /// How many corners triangles use, at most `3 MAX_TRIANGLES`.
@@ -154,5 +151,53 @@ impl<'a> Part<'a> {
             None => corners,
             Some(indices) => corners.map(|corner| indices.index(corner)),
         }
+    }
+}
+
+/// How many corners a primitive has.
+pub(super) fn corners(primitive: &gltf::Primitive<'_>) -> usize {
+    let corners = primitive.indices().or(primitive.get(&Semantic::Positions));
+    corners.map_or(0, |accessor| accessor.count())
+}
+
+/// How many triangles so many corners make; `None` of points and lines.
+pub(super) fn triangles(mode: Mode, corners: usize) -> Option<usize> {
+    match mode {
+        Mode::Triangles => Some(corners / 3),
+        Mode::TriangleStrip | Mode::TriangleFan => Some(corners.saturating_sub(2)),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => None,
+    }
+}
+
+/// The vertices of a primitive that triangles use: a bit for each from the first to the last. Few of many may be used,
+/// as where primitives share their vertices.
+pub(super) struct Vertices {
+    first: u32,
+    used: Bits,
+}
+
+impl Vertices {
+    /// Those that are used, rising.
+    pub fn in_order(&self) -> impl Iterator<Item = u32> {
+        self.used.set_places().map(|place| self.first + place as u32)
+    }
+
+    /// Numbers for them, from 0.
+    pub fn numbers(&self) -> VertexNumbers<'_> {
+        VertexNumbers { first: self.first, numbers: self.used.numbers() }
+    }
+}
+
+/// Numbers of the vertices that are used.
+pub(super) struct VertexNumbers<'a> {
+    first: u32,
+    numbers: Numbers<'a>,
+}
+
+impl VertexNumbers<'_> {
+    /// How many are used before this one, which is.
+    #[inline]
+    pub fn of(&self, vertex: u32) -> u32 {
+        self.numbers.of((vertex - self.first) as usize)
     }
 }

@@ -1,85 +1,90 @@
 //! One mesh of all that a scene shows.
 
+use super::Raw;
 use super::primitives::Part;
 use crate::mesh::check::MAX_TRIANGLES;
-use crate::mesh::color::{self, Colors};
+use crate::mesh::color;
+use crate::mesh::lists::{List, Lists, no_room};
 use crate::mesh::material::{DEFAULT_DIFFUSE, Material};
-use crate::mesh::{Attributes, Mesh, Normal, ReadReport};
+use crate::mesh::{Attributes, Image, Normal, ReadReport};
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
+/// How many triangles pass between two reports of progress.
+const TRIANGLES_PER_REPORT: u32 = 1 << 16;
+
 /// A mesh that grows, primitive by primitive.
-pub(super) struct Builder {
-    mesh: Mesh,
-    materials: Vec<Material>,
-    of_triangle: Vec<u32>,
-    vertex_colors: Vec<[u8; 3]>,
+pub(super) struct Builder<L: Lists> {
+    positions: L::Of<Vec3>,
+    triangles: L::Of<[u32; 3]>,
     /// What the scene calls for.
-    has_attributes: bool,
-    by_material: bool,
-    by_vertex: bool,
+    attributes: Option<L::Of<Attributes>>,
+    of_triangle: Option<L::Of<u32>>,
+    of_vertices: Option<L::Of<[u8; 3]>>,
+    materials: Vec<Material>,
+    /// Whether any triangle has no material.
+    any_bare: bool,
     /// Vertices without a colour, and texture coordinates that are none.
     uncolored: u64,
     bad_uv: u64,
-    /// For each vertex of a primitive from the first that it uses, its place in the mesh.
-    places: Vec<u32>,
+    /// How many triangles there will be.
+    total: usize,
 }
 
-/// No place yet.
-const NOWHERE: u32 = u32::MAX;
-
-impl Builder {
+impl<L: Lists> Builder<L> {
     /// An empty mesh with room for all triangles of `placed`.
     ///
     /// # Errors
     /// There are too many.
     pub fn new(
+        lists: &L,
         placed: &[(&[Part<'_>], DMat4)],
         materials: Vec<Material>,
         report: &mut ReadReport,
     ) -> Result<Self, String> {
         let parts = || placed.iter().flat_map(|(parts, _)| *parts);
-        let triangles = parts().fold(0_usize, |sum, part| sum.saturating_add(part.triangles));
-        if triangles > MAX_TRIANGLES {
-            return Err(format!(
-                "{triangles} triangles, at most {MAX_TRIANGLES} are possible; split the model"
-            ));
+        let total = parts().fold(0_usize, |sum, part| sum.saturating_add(part.triangles));
+        if total > MAX_TRIANGLES {
+            return Err(format!("{total} triangles, at most {MAX_TRIANGLES} are possible; split the model"));
         }
         let by_material = parts().any(|part| part.material.is_some());
         let colored = parts().any(|part| part.colors.is_some());
         if by_material && colored {
             report.note("vertex colours ignored: materials have theirs".into());
         }
+        let has_attributes = parts().any(|part| part.normals.is_some() || part.uv.is_some());
+        let by_vertex = colored && !by_material;
         let mut builder = Self {
-            mesh: Mesh::default(),
+            positions: lists.list().map_err(no_room)?,
+            triangles: lists.list().map_err(no_room)?,
+            attributes: has_attributes.then(|| lists.list()).transpose().map_err(no_room)?,
+            of_triangle: by_material.then(|| lists.list()).transpose().map_err(no_room)?,
+            of_vertices: by_vertex.then(|| lists.list()).transpose().map_err(no_room)?,
             materials,
-            of_triangle: Vec::new(),
-            vertex_colors: Vec::new(),
-            has_attributes: parts().any(|part| part.normals.is_some() || part.uv.is_some()),
-            by_material,
-            by_vertex: colored && !by_material,
+            any_bare: false,
             uncolored: 0,
             bad_uv: 0,
-            places: Vec::new(),
+            total,
         };
-        let few = |_| format!("not enough memory for its {triangles} triangles");
-        builder.mesh.triangles.try_reserve_exact(triangles).map_err(few)?;
-        if builder.has_attributes {
-            builder.mesh.attributes.try_reserve_exact(triangles).map_err(few)?;
-        }
-        if by_material {
-            builder.of_triangle.try_reserve_exact(triangles).map_err(few)?;
-        }
+        let few = |_| format!("not enough memory for its {total} triangles");
+        builder.triangles.expect(total).map_err(few)?;
+        builder.attributes.as_mut().map_or(Ok(()), |list| list.expect(total)).map_err(few)?;
+        builder.of_triangle.as_mut().map_or(Ok(()), |list| list.expect(total)).map_err(few)?;
         Ok(builder)
     }
 
-    /// Adds a primitive, which `transform` takes to the scene.
+    /// Adds a primitive, which `transform` takes to the scene: the vertices that its triangles use, in their order,
+    /// and the triangles. `progress` is told now and then what part (0 to 1) of all triangles is behind.
     ///
     /// # Errors
-    /// Its indices are out of range, or vertices have become too many.
-    pub fn add(&mut self, part: &Part<'_>, transform: &DMat4) -> Result<(), String> {
-        let Some((first, last)) = part.vertices()? else { return Ok(()) };
-        self.places.clear();
-        self.places.resize((last - first) as usize + 1, NOWHERE);
+    /// Its indices are out of range.
+    pub fn add(&mut self, part: &Part<'_>, transform: &DMat4, progress: &dyn Fn(f32)) -> Result<(), String> {
+        let Some(vertices) = part.vertices()? else { return Ok(()) };
+        // Each vertex is a corner of at most MAX_TRIANGLES triangles: 32 bits count them all.
+        let base = self.positions.len() as u32;
+        for vertex in vertices.in_order() {
+            self.vertex(part, vertex, transform);
+        }
+        let numbers = vertices.numbers();
         // Normals go by the inverse transpose. This is the same but for its length, and there is one of any matrix.
         let linear = DMat3::from_mat4(*transform);
         let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
@@ -87,89 +92,72 @@ impl Builder {
         let sign = if mirrored { -1.0 } else { 1.0 };
         let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
         for number in 0..part.triangles as u32 {
+            if number.is_multiple_of(TRIANGLES_PER_REPORT) {
+                progress(self.triangles.len() as f32 / self.total as f32);
+            }
             let mut corners = part.triangle(number);
             if mirrored {
                 corners.swap(1, 2);
             }
-            let mut triangle = [0; 3];
-            for (place, vertex) in triangle.iter_mut().zip(corners) {
-                *place = self.place(part, vertex, first, transform)?;
-            }
-            self.mesh.triangles.push(triangle);
-            if self.has_attributes {
-                let attributes = self.attributes(part, corners, &turn);
-                self.mesh.attributes.push(attributes);
+            self.triangles.push(corners.map(|vertex| base + numbers.of(vertex)));
+            if let Some(attributes) = &mut self.attributes {
+                attributes.push(attributes_of(part, corners, &turn, &mut self.bad_uv));
             }
         }
-        if self.by_material {
-            let material = part.material.map_or(self.materials.len(), |material| material) as u32;
-            self.of_triangle.resize(self.mesh.triangles.len(), material);
+        if let Some(of_triangle) = &mut self.of_triangle {
+            self.any_bare |= part.material.is_none();
+            let material = part.material.unwrap_or(self.materials.len());
+            of_triangle.fill(material as u32, self.triangles.len());
         }
         Ok(())
     }
 
-    /// A vertex's place in the mesh, where it is put when it is first met.
+    /// Adds a vertex.
     #[inline]
-    fn place(&mut self, part: &Part<'_>, vertex: u32, first: u32, transform: &DMat4) -> Result<u32, String> {
-        let place = &mut self.places[(vertex - first) as usize];
-        if *place != NOWHERE {
-            return Ok(*place);
-        }
-        let positions = &mut self.mesh.positions;
-        *place = u32::try_from(positions.len()).ok().filter(|&place| place != NOWHERE).ok_or_else(|| {
-            format!("more than {} vertices, the most that are possible; split the model", u32::MAX)
-        })?;
+    fn vertex(&mut self, part: &Part<'_>, vertex: u32, transform: &DMat4) {
         let position = DVec3::from_array(part.positions.numbers(vertex).map(f64::from));
-        positions.push(transform.transform_point3(position).as_vec3());
-        if self.by_vertex {
+        self.positions.push(transform.transform_point3(position).as_vec3());
+        if let Some(of_vertices) = &mut self.of_vertices {
             let color = part.colors.as_ref().map(|colors| Vec3::from_array(colors.numbers(vertex)));
             self.uncolored += u64::from(color.is_none());
-            self.vertex_colors.push(color::encode(color.unwrap_or(DEFAULT_DIFFUSE)));
+            of_vertices.push(color::encode(color.unwrap_or(DEFAULT_DIFFUSE)));
         }
-        Ok(*place)
     }
 
-    /// What a triangle's corners have.
-    #[inline]
-    fn attributes(&mut self, part: &Part<'_>, corners: [u32; 3], turn: &DMat3) -> Attributes {
-        let mut attributes = Attributes::NONE;
-        if let Some(uv) = &part.uv {
-            attributes.uv = corners.map(|vertex| {
-                let [u, v] = uv.numbers(vertex);
-                // Ours runs upward.
-                let uv = [u, 1.0 - v];
-                let finite = u.is_finite() && v.is_finite();
-                self.bad_uv += u64::from(!finite);
-                if finite { uv } else { [0.0; 2] }
-            });
-        }
-        if let Some(normals) = &part.normals {
-            attributes.normals = corners.map(|vertex| {
-                let normal = DVec3::from_array(normals.numbers(vertex).map(f64::from));
-                (*turn * normal)
-                    .try_normalize()
-                    .map_or(Normal::NONE, |normal| Normal::encode(normal.as_vec3()))
-            });
-        }
-        attributes
-    }
-
-    /// The mesh, without its pictures.
-    pub fn finish(mut self, report: &mut ReadReport) -> Mesh {
+    /// What the scene holds, with these pictures.
+    pub fn finish(mut self, images: Vec<Image>, report: &mut ReadReport) -> Raw<L> {
         report.uncolored_vertices += self.uncolored;
         if self.bad_uv > 0 {
             report.note(format!("NaN or infinite texture coordinates of {} corners taken as 0", self.bad_uv));
         }
-        if self.by_material {
-            let none = self.materials.len() as u32;
-            if self.of_triangle.contains(&none) {
-                self.materials.push(Material::matt("(none)", DEFAULT_DIFFUSE));
-            }
-            self.mesh.colors =
-                Colors::PerMaterial { materials: self.materials, of_triangle: self.of_triangle };
-        } else if self.by_vertex {
-            self.mesh.colors = Colors::PerVertex(self.vertex_colors);
+        if self.any_bare {
+            self.materials.push(Material::matt("(none)", DEFAULT_DIFFUSE));
         }
-        self.mesh
+        let Self { positions, triangles, attributes, of_triangle, of_vertices, materials, .. } = self;
+        let of_materials = of_triangle.map(|of_triangle| (materials, of_triangle));
+        Raw { positions, triangles, attributes, of_vertices, of_materials, images }
     }
+}
+
+/// What a triangle's corners have; texture coordinates that are none are counted.
+#[inline]
+fn attributes_of(part: &Part<'_>, corners: [u32; 3], turn: &DMat3, bad_uv: &mut u64) -> Attributes {
+    let mut attributes = Attributes::NONE;
+    if let Some(uv) = &part.uv {
+        attributes.uv = corners.map(|vertex| {
+            let [u, v] = uv.numbers(vertex);
+            // Ours runs upward.
+            let uv = [u, 1.0 - v];
+            let finite = u.is_finite() && v.is_finite();
+            *bad_uv += u64::from(!finite);
+            if finite { uv } else { [0.0; 2] }
+        });
+    }
+    if let Some(normals) = &part.normals {
+        attributes.normals = corners.map(|vertex| {
+            let normal = DVec3::from_array(normals.numbers(vertex).map(f64::from));
+            (*turn * normal).try_normalize().map_or(Normal::NONE, |normal| Normal::encode(normal.as_vec3()))
+        });
+    }
+    attributes
 }

@@ -8,8 +8,11 @@ use gltf::material::NormalTexture;
 use gltf::texture::{Info, Texture, WrappingMode};
 use serde::Deserialize;
 use std::collections::HashMap;
+use std::io;
 use std::path::Path;
-use std::sync::Arc;
+
+/// Keeps the bytes of a picture, somewhere.
+pub(super) type Keep<'a> = &'a dyn Fn(&[u8]) -> io::Result<ImageSource>;
 
 /// A picture that a material names.
 pub(super) struct Picture<'a> {
@@ -70,23 +73,28 @@ pub(super) struct Textures<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
     folder: &'a Path,
+    keep: Keep<'a>,
+    /// Why a picture could not be kept.
+    failed: Option<io::Error>,
     /// Each once.
-    pub images: Vec<Image>,
+    images: Vec<Image>,
     /// By the image's number in the document, its place in `images`.
     places: HashMap<Option<usize>, u32>,
     /// By the number of a buffer view, the copy of its bytes.
-    copies: HashMap<usize, Arc<[u8]>>,
+    copies: HashMap<usize, ImageSource>,
     /// Bytes that may still be copied out of buffers.
     left: u64,
 }
 
 impl<'a> Textures<'a> {
-    /// None yet, of a model in `folder`.
-    pub fn new(document: &'a Document, buffers: &'a Buffers<'a>, folder: &'a Path) -> Self {
+    /// None yet, of a model in `folder`. `keep` takes the bytes of those that lie in buffers.
+    pub fn new(document: &'a Document, buffers: &'a Buffers<'a>, folder: &'a Path, keep: Keep<'a>) -> Self {
         Self {
             document,
             buffers,
             folder,
+            keep,
+            failed: None,
             images: Vec::new(),
             places: HashMap::new(),
             copies: HashMap::new(),
@@ -144,29 +152,47 @@ impl<'a> Textures<'a> {
             (Some(uri), _) => {
                 let name = if uri.starts_with("data:") { named() } else { uri::shown(uri) };
                 let source = match uri::follow(uri, self.folder) {
-                    Ok(Target::Bytes(bytes)) => ImageSource::Bytes(bytes.into()),
+                    Ok(Target::Bytes(bytes)) => self.kept(&bytes),
                     Ok(Target::File(path)) => ImageSource::File(path),
                     Err(why) => missing(why.into()),
                 };
                 (name, source)
             }
-            (None, Some(view)) => (named(), self.copy(view.value()).map_or_else(missing, ImageSource::Bytes)),
+            (None, Some(view)) => (named(), self.copy(view.value()).unwrap_or_else(missing)),
             (None, None) => (named(), missing("has no data".into())),
         };
         Image { name, source }
     }
 
     /// A view's bytes.
-    fn copy(&mut self, view: usize) -> Result<Arc<[u8]>, String> {
+    fn copy(&mut self, view: usize) -> Result<ImageSource, String> {
         if let Some(copy) = self.copies.get(&view) {
             return Ok(copy.clone());
         }
-        let bytes = self.buffers.view(view)?;
+        let bytes = self.buffers.view(view)?.all();
         // A short file could name the same long piece of a buffer in views without end.
         let left = self.left.checked_sub(bytes.len() as u64);
         self.left = left.ok_or("overlaps others in its buffer")?;
-        let copy: Arc<[u8]> = bytes.into();
+        let copy = self.kept(bytes);
+        self.buffers.let_go();
         self.copies.insert(view, copy.clone());
         Ok(copy)
+    }
+
+    /// A picture's bytes, wherever they are kept. That they could not be is told by [`finish`](Self::finish).
+    fn kept(&mut self, bytes: &[u8]) -> ImageSource {
+        (self.keep)(bytes).unwrap_or_else(|error| {
+            let why = error.to_string();
+            self.failed = Some(error);
+            ImageSource::Missing(why)
+        })
+    }
+
+    /// All of them.
+    ///
+    /// # Errors
+    /// One could not be kept.
+    pub fn finish(self) -> io::Result<Vec<Image>> {
+        self.failed.map_or(Ok(self.images), Err)
     }
 }

@@ -7,6 +7,7 @@ use crate::mesh::color;
 use crate::mesh::lists::{List, Lists, no_room};
 use crate::mesh::material::DEFAULT_DIFFUSE;
 use glam::Vec3;
+use std::collections::TryReserveError;
 
 /// Which item of an element is wrong (counted from 0), and what is wrong with it.
 pub(super) type ItemError = (u64, String);
@@ -185,6 +186,11 @@ fn no_list(error: std::io::Error) -> ItemError {
     (0, no_room(error))
 }
 
+/// There is no memory for a list.
+fn too_many(_: TryReserveError) -> ItemError {
+    (0, "not enough memory for so many".into())
+}
+
 /// Element `vertex`.
 pub(super) struct Vertices<L: Lists> {
     pub positions: L::Of<Vec3>,
@@ -205,7 +211,7 @@ impl<L: Lists> Vertices<L> {
             return Err((0, "it has no properties x, y and z".into()));
         }
         // The caller made sure that the file is large enough for so many.
-        self.positions.expect(element.count as usize);
+        self.positions.expect(element.count as usize).map_err(too_many)?;
         if let Some(kind) = layout.color {
             self.shades.begin(lists, kind, 0)?;
         }
@@ -262,7 +268,7 @@ impl<L: Lists> Faces<L> {
         }
         if !strips {
             // The caller made sure that the file is large enough for so many.
-            self.triangles.expect(element.count as usize);
+            self.triangles.expect(element.count as usize).map_err(too_many)?;
         }
         if let Some(kind) = layout.color {
             self.shades.begin(lists, kind, self.triangles.len())?;

@@ -1,20 +1,21 @@
 //! Meshes in files, for who cannot have them in memory.
 //!
-//! A PLY, OBJ or STL file is read from its beginning to its end, and what it holds goes to files on the way (`whole`);
-//! checking it is some passes over these (`check`). What comes out is the mesh that [`read`](super::read()) gives,
-//! triangle by triangle.
+//! A PLY, OBJ or STL file is read from its beginning to its end, a glTF file's buffers primitive by primitive, and what
+//! they hold goes to files on the way (`whole`); checking it is some passes over these (`check`). What comes out is the
+//! mesh that [`read`](super::read()) gives, triangle by triangle.
 
 mod behind;
 mod check;
 mod whole;
 
 use super::lists::InFiles;
-use super::read::map;
-use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, obj, ply, stl};
+use super::read::{Format, map};
+use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, gltf, obj, ply, stl};
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::spool::{Spool, Spooled};
 use behind::Behind;
+pub(super) use behind::{in_small_pages, let_go};
 use bytemuck::Pod;
 use check::{Fault, check};
 use glam::Vec3;
@@ -115,7 +116,7 @@ fn spooled<T: Pod>(list: &[T], folder: &Path) -> io::Result<Spooled<T>> {
 }
 
 /// What is known of a model before it is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Announced {
     /// Vertices in the file.
     pub vertices: u64,
@@ -137,30 +138,10 @@ impl Announced {
     }
 }
 
-/// The kinds of files that are read piece by piece.
-#[derive(Clone, Copy)]
-enum Format {
-    Ply,
-    Obj,
-    Stl,
-}
-
-impl Format {
-    fn of(path: &Path) -> Option<Self> {
-        let ending = path.extension()?;
-        match () {
-            () if ending.eq_ignore_ascii_case("ply") => Some(Self::Ply),
-            () if ending.eq_ignore_ascii_case("obj") => Some(Self::Obj),
-            () if ending.eq_ignore_ascii_case("stl") => Some(Self::Stl),
-            () => None,
-        }
-    }
-}
-
-/// How much a PLY or binary STL file announces in its header, and how much is in an OBJ or ASCII STL file, which is
-/// looked through for that; `None` for other files, which are read into memory only, and for what cannot be read.
+/// How much a PLY or binary STL file announces in its header, and a glTF file in its JSON, and how much is in an OBJ or
+/// ASCII STL file, which is looked through for that; `None` for what cannot be read.
 pub fn announced(path: &Path) -> Option<Announced> {
-    match Format::of(path)? {
+    match Format::of(path).ok()? {
         Format::Ply => {
             /// Headers are shorter.
             const BEGINNING: u64 = 1 << 16;
@@ -178,22 +159,23 @@ pub fn announced(path: &Path) -> Option<Announced> {
             let behind = Behind::new(&bytes);
             stl::announced(&bytes, &|part| behind.release(part))
         }
+        Format::Gltf => gltf::count(&map(path).ok()?),
     }
 }
 
-/// Reads a PLY, OBJ or STL file to files in `folder`, which vanish with the mesh. `progress` is told now and then what
-/// part (0 to 1) is behind. Takes a bit for each vertex, some megabytes, and an OBJ file's materials; of an STL file, a
-/// bit and a half for each corner, and some ten megabytes.
+/// Reads a model to files in `folder`, which vanish with the mesh. `progress` is told now and then what part (0 to 1) is
+/// behind. Takes a bit and a half for each vertex, some megabytes, and an OBJ or glTF file's materials; of a glTF file,
+/// all of its JSON; of an STL file, a bit and a half for each corner, and some ten megabytes more.
 ///
 /// # Errors
-/// As [`read`](super::read()), or there is no room in `folder`. Panics if it is a file of another kind.
+/// As [`read`](super::read()), or there is no room in `folder`.
 pub fn read(path: &Path, folder: &Path, progress: &dyn Fn(f32)) -> Result<(SpooledMesh, ReadReport)> {
     let malformed = |message: String| Error::malformed(path, message);
+    let format = Format::of(path)?;
     let bytes = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
-    let lists = InFiles(folder.into());
+    let lists = InFiles::new(folder);
     let mut report = ReadReport::default();
     let behind = Behind::new(&bytes);
-    let format = Format::of(path).expect("it is a kind that is read piece by piece");
     // Welding an STL file's corners takes longer than reading them.
     let reading = if matches!(format, Format::Stl) { 0.2 } else { 0.7 };
     let told = |part: f32| {
@@ -208,6 +190,13 @@ pub fn read(path: &Path, folder: &Path, progress: &dyn Fn(f32)) -> Result<(Spool
         Format::Obj => {
             let raw = obj::parse_to(&lists, &bytes, path, &mut report, &told).map_err(malformed)?;
             Whole::of_obj(raw, &lists)
+        }
+        Format::Gltf => {
+            in_small_pages(&bytes);
+            let let_go = || let_go(&bytes, 0..bytes.len());
+            let told = |part: f32| progress(reading * part);
+            let raw = gltf::parse_to(&lists, &bytes, path, &mut report, &told, Some(&let_go));
+            Whole::of_gltf(raw.map_err(malformed)?)
         }
         Format::Stl => {
             let raw = stl::parse_to(&lists, &bytes, &mut report, &told).map_err(malformed)?;
@@ -230,8 +219,8 @@ impl Whole {
         progress: &dyn Fn(f32),
     ) -> Result<SpooledMesh> {
         let (vertices, faces) = (self.positions.len(), self.triangles.len());
-        check(self, &lists.0, report, progress).map_err(|fault| match fault {
-            Fault::Io(source) => Error::Write { path: lists.0.clone(), source },
+        check(self, lists.folder(), report, progress).map_err(|fault| match fault {
+            Fault::Io(source) => Error::Write { path: lists.folder().into(), source },
             Fault::Unusable(unusable) => Error::malformed(path, unusable.message(vertices, faces)),
         })
     }

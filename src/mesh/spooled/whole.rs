@@ -3,7 +3,7 @@
 use super::SpooledColors;
 use crate::mesh::lists::{InFiles, Lists};
 use crate::mesh::ply::Shades;
-use crate::mesh::{Attributes, Colors, Image, ReadReport, color, obj, ply, stl};
+use crate::mesh::{Attributes, Colors, Image, ReadReport, color, gltf, obj, ply, stl};
 use crate::spool::{Spool, Spooled};
 use glam::Vec3;
 use std::io;
@@ -52,6 +52,20 @@ impl Whole {
         };
         let (positions, triangles) = (raw.positions.finish()?, raw.triangles.finish()?);
         Ok(Self { positions, triangles, colors, attributes, images })
+    }
+
+    /// What a glTF file's scene held.
+    pub fn of_gltf(raw: gltf::Raw<InFiles>) -> io::Result<Self> {
+        let colors = match (raw.of_materials, raw.of_vertices) {
+            (Some((materials, of_triangle)), _) => {
+                SpooledColors::PerMaterial { materials, of_triangle: of_triangle.finish()? }
+            }
+            (None, Some(of_vertices)) => SpooledColors::PerVertex(of_vertices.finish()?),
+            (None, None) => default_color(),
+        };
+        let (positions, triangles) = (raw.positions.finish()?, raw.triangles.finish()?);
+        let attributes = raw.attributes.map(Spool::finish).transpose()?;
+        Ok(Self { positions, triangles, colors, attributes, images: raw.images })
     }
 
     /// What an STL file held. `progress` is told now and then what part (0 to 1) is behind.

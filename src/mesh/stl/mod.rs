@@ -221,7 +221,7 @@ mod tests {
         let read =
             parse(bytes, Path::new("model.stl"), &mut report, &|_| ()).map(|mesh| (mesh, report.clone()));
 
-        let lists = InFiles(std::env::temp_dir());
+        let lists = InFiles::new(std::env::temp_dir());
         let mut report = ReadReport::default();
         let in_files = parse_to(&lists, bytes, &mut report, &|_| ()).map(|weld| {
             let (positions, triangles) = weld.finish(&lists, &|_| ()).expect("room");

@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn vertices_are_those_of_one_table_in_their_order() {
-        let lists = InFiles(std::env::temp_dir());
+        let lists = InFiles::new(std::env::temp_dir());
         for (count, parts) in [(0, 1), (1, 1), (2, 256), (4000, 1), (4000, 3), (20_000, 5)] {
             let mut soup = Soup::default();
             let mut weld = Weld::in_parts(&lists, parts).expect("room");
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn parts_are_as_many_as_their_tables_ask_for() {
-        let lists = InFiles(std::env::temp_dir());
+        let lists = InFiles::new(std::env::temp_dir());
         let parts = |triangles| Weld::new(&lists, triangles).expect("room").parts.len();
         let part = CORNERS_PER_PART / 3;
         assert_eq!([0, 1, part, part + 1, 100 * part].map(parts), [1, 1, 1, 2, 100]);

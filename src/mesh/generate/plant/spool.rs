@@ -18,7 +18,7 @@ pub fn spool(folder: &Path, params: PlantParams, progress: &dyn Fn(f64)) -> Resu
     let whole = whole(folder, params, &|part| progress(0.8 * part));
     let whole = whole.map_err(|source| Error::Write { path: folder.into(), source })?;
     let told = |part: f32| progress(0.8 + 0.2 * f64::from(part));
-    whole.checked(&InFiles(folder.into()), folder, &mut Default::default(), &told)
+    whole.checked(&InFiles::new(folder), folder, &mut Default::default(), &told)
 }
 
 fn whole(folder: &Path, params: PlantParams, progress: &dyn Fn(f64)) -> io::Result<Whole> {

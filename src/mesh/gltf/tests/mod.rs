@@ -3,12 +3,16 @@
 mod broken;
 mod looks;
 
-use super::parse;
-use crate::mesh::{Colors, Mesh, Normal, ReadReport};
+use super::{parse, parse_to};
+use crate::geometry::Aabb;
+use crate::mesh::lists::InFiles;
+use crate::mesh::spooled::{SpooledMesh, Whole};
+use crate::mesh::{Colors, Image, ImageSource, Mesh, Normal, ReadReport};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
+use std::cell::Cell;
 use std::fs;
 use std::path::Path;
 
@@ -74,9 +78,31 @@ fn changed(changes: &[(&str, Value)]) -> Value {
     document
 }
 
+/// What a file's bytes become, in memory and in files alike.
 fn read_bytes(bytes: &[u8], path: &Path) -> Result<(Mesh, ReadReport), String> {
     let mut report = ReadReport::default();
-    parse(bytes, path, &mut report, &|_| ()).map(|mesh| (mesh, report))
+    let read = parse(bytes, path, &mut report, &|_| ()).map(|mesh| (mesh, report));
+    assert_eq!(read_to_files(bytes, path, &|| ()), read);
+    read
+}
+
+/// What they become in files. `let_go` is called now and then.
+fn read_to_files(bytes: &[u8], path: &Path, let_go: &dyn Fn()) -> Result<(Mesh, ReadReport), String> {
+    let lists = InFiles::new(std::env::temp_dir());
+    let mut report = ReadReport::default();
+    let raw = parse_to(&lists, bytes, path, &mut report, &|_| (), Some(let_go))?;
+    let Whole { positions, triangles, colors, attributes, images } = Whole::of_gltf(raw).expect("room");
+    let in_memory = |Image { name, source }| match source {
+        ImageSource::Bytes(_) => panic!("{name} is in memory"),
+        source @ ImageSource::Packed(_) => {
+            let bytes = source.read().expect("readable");
+            Image { name, source: ImageSource::Bytes((*bytes).into()) }
+        }
+        source => Image { name, source },
+    };
+    let images = images.into_iter().map(in_memory).collect();
+    let mesh = SpooledMesh { positions, triangles, colors, attributes, images, bounds: Aabb::EMPTY };
+    Ok((mesh.to_mesh().expect("readable"), report))
 }
 
 #[track_caller]
@@ -237,4 +263,42 @@ fn quantized_meshes_are_read() {
         assert!(position.distance(corner.into()) < 1e-6, "{position}");
     }
     assert_eq!(report, ReadReport::default());
+}
+
+#[test]
+fn vertices_keep_their_order_and_those_that_nothing_uses_are_left_out() {
+    let mut bytes = buffer();
+    bytes[128..140].copy_from_slice(bytemuck::bytes_of(&[3_u16, 1, 2, 2, 1, 3]));
+    let (mesh, _) = read(&changed(&[("/buffers/0/uri", json!(data_uri(&bytes)))]));
+    assert_eq!(mesh.positions, [1, 2, 3].map(|vertex: usize| Vec3::from_array(CORNERS[vertex])));
+    assert_eq!(mesh.triangles, [[2, 0, 1], [1, 0, 2]]);
+}
+
+#[test]
+fn not_much_of_a_buffer_is_in_memory_at_any_time() {
+    // A million vertices of 12 bytes, and triangles whose corners all lie far from one another.
+    const VERTICES: u32 = 1 << 20;
+    const CORNERS: u32 = 3 << 12;
+    let mut carried = vec![0; VERTICES as usize * 12];
+    let far = (0..CORNERS).map(|corner| corner.wrapping_mul(2_654_435_761) >> 12);
+    carried.extend(far.flat_map(u32::to_le_bytes));
+    let document = changed(&[
+        ("/buffers/0", json!({ "byteLength": carried.len() })),
+        ("/bufferViews/0/byteLength", json!(VERTICES * 12)),
+        ("/bufferViews/3", json!({ "buffer": 0, "byteOffset": VERTICES * 12, "byteLength": CORNERS * 4 })),
+        ("/accessors/0/count", json!(VERTICES)),
+        (
+            "/accessors/3",
+            json!({ "bufferView": 3, "componentType": 5125, "count": CORNERS, "type": "SCALAR" }),
+        ),
+        ("/meshes/0/primitives/0/attributes", json!({ "POSITION": 0, "NORMAL": 0 })),
+    ]);
+    let bytes = glb(2, &document, &carried);
+    let let_go = Cell::new(0);
+    let count = || let_go.set(let_go.get() + 1);
+    let (mesh, _) = read_to_files(&bytes, Path::new("model.glb"), &count).expect("it can be read");
+    assert_eq!(mesh.triangles.len(), 1 << 12);
+    // A look at a corner's normal is elsewhere each time; positions are looked at in order.
+    let looks = CORNERS as usize + carried.len() / (64 << 10);
+    assert!((looks / 128..=looks / 128 + 4).contains(&let_go.get()), "{} times", let_go.get());
 }
