@@ -123,6 +123,16 @@ pub(super) fn is_attribute(property: &Property) -> bool {
     matches!(slot(&property.name, property.kind), Slot::Coordinate(_) | Slot::Normal(_))
 }
 
+/// The type of the numbers by which an element's items name vertices, if they do.
+pub(super) fn index_type(element: &Element) -> Option<Scalar> {
+    element.properties.iter().find_map(|property| {
+        match (slot(&property.name, property.kind), property.kind) {
+            (Slot::Indices, Kind::List { item, .. }) => Some(item),
+            _ => None,
+        }
+    })
+}
+
 /// One item's values.
 #[derive(Default)]
 struct Item {

@@ -64,14 +64,35 @@ pub(super) struct Raw<L: Lists> {
     pub looks: Looks<L>,
 }
 
-/// What a PLY file's header announces; `None` if it is no PLY file.
-pub(super) fn announced(bytes: &[u8]) -> Option<Announced> {
+/// What a PLY file's header announces; `None` if it is no PLY file. How long strips are, no header says: they count as
+/// if they were all that is in the file's `size` bytes beside what is known.
+pub(super) fn announced(bytes: &[u8], size: u64) -> Option<Announced> {
     let header = Header::parse(bytes).ok()?;
     let named = |name: &'static str| header.elements.iter().filter(move |element| element.name == name);
-    let count = |name| named(name).map(|element| element.count).sum();
+    let count = |name| named(name).map(|element| element.count).sum::<u64>();
     let mut properties = named("vertex").flat_map(|element| &element.properties);
     let attributes = properties.any(elements::is_attribute);
-    Some(Announced { vertices: count("vertex"), triangles: count("face"), attributes })
+    let body = size.saturating_sub(header.size as u64);
+    let in_strips = match header.encoding {
+        Encoding::Ascii => most_in_strips(&Ascii::new(&[], 0), &header, body),
+        Encoding::LittleEndian | Encoding::BigEndian => {
+            most_in_strips(&Binary::<false>::new(&[]), &header, body)
+        }
+    };
+    let triangles = count("face").saturating_add(in_strips);
+    Some(Announced { vertices: count("vertex"), triangles, attributes })
+}
+
+/// How many triangles strips can have in a body of so many bytes that are written as in `source`.
+fn most_in_strips<S: Source>(source: &S, header: &Header, body: u64) -> u64 {
+    let mut strips =
+        header.elements.iter().filter(|element| element.name == "tristrips" && element.count > 0);
+    let Some(index) = strips.find_map(elements::index_type) else { return 0 };
+    let left = header.elements.iter().fold(body, |left, element| {
+        let least: u64 = element.properties.iter().map(|p| source.least_size(p)).sum();
+        left.saturating_sub(element.count.saturating_mul(least))
+    });
+    left / source.least_number(index)
 }
 
 /// Parses a PLY file's bytes, to lists of a kind.

@@ -120,7 +120,7 @@ fn spooled<T: Pod>(list: &[T], folder: &Path) -> io::Result<Spooled<T>> {
 pub struct Announced {
     /// Vertices in the file.
     pub vertices: u64,
-    /// Triangles; a polygon of a PLY file counts as one.
+    /// Triangles; a polygon of a PLY file counts as one, and strips as many as there may be at most.
     pub triangles: u64,
     /// Whether triangles may have texture coordinates or normals.
     pub attributes: bool,
@@ -146,8 +146,10 @@ pub fn announced(path: &Path) -> Option<Announced> {
             /// Headers are shorter.
             const BEGINNING: u64 = 1 << 16;
             let mut bytes = Vec::new();
-            File::open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
-            ply::announced(&bytes)
+            let file = File::open(path).ok()?;
+            let size = file.metadata().ok()?.len();
+            file.take(BEGINNING).read_to_end(&mut bytes).ok()?;
+            ply::announced(&bytes, size)
         }
         Format::Obj => {
             let bytes = map(path).ok()?;
