@@ -11,6 +11,7 @@
 
 mod buffers;
 mod container;
+mod corners;
 mod count;
 mod elements;
 mod materials;

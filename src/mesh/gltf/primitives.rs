@@ -109,23 +109,15 @@ impl<'a> Part<'a> {
     /// # Errors
     /// One is not among the positions.
     pub fn vertices(&self) -> Result<Option<Vertices>, String> {
-        let Some(last_corner) = self.corners().checked_sub(1) else { return Ok(None) };
-        let (first, last) = match &self.indices {
-            None => (0, last_corner),
-            Some(indices) => (0..=last_corner)
-                .map(|corner| indices.index(corner))
-                .fold((u32::MAX, 0), |(first, last), index| (first.min(index), last.max(index))),
-        };
+        let vertex = |corner| self.indices.as_ref().map_or(corner, |indices| indices.index(corner));
+        let corners = (0..self.corners()).map(vertex);
+        let Some((first, last)) = bounds(corners.clone()) else { return Ok(None) };
+        // Before a bit is set: an index out of range may be any number.
         if last as usize >= self.positions.count {
             let vertices = self.positions.count;
             return Err(format!("index {last} is out of range, a primitive has {vertices} vertices"));
         }
-        let mut used = Bits::new((last - first) as usize + 1);
-        for corner in 0..=last_corner {
-            let vertex = self.indices.as_ref().map_or(corner, |indices| indices.index(corner));
-            used.set((vertex - first) as usize);
-        }
-        Ok(Some(Vertices { first, used }))
+        Ok(Some(Vertices::within(first, last, corners)))
     }
 
     /// How many corners triangles use, at most `3 MAX_TRIANGLES`.
@@ -169,14 +161,33 @@ pub(super) fn triangles(mode: Mode, corners: usize) -> Option<usize> {
     }
 }
 
-/// The vertices of a primitive that triangles use: a bit for each from the first to the last. Few of many may be used,
-/// as where primitives share their vertices.
+/// The first and the last of some vertices; `None` if there are none.
+fn bounds(mut vertices: impl Iterator<Item = u32>) -> Option<(u32, u32)> {
+    let first = vertices.next()?;
+    Some(vertices.fold((first, first), |(first, last), vertex| (first.min(vertex), last.max(vertex))))
+}
+
+/// The vertices that some corners use: a bit for each from the first to the last. Few of many may be used, as where
+/// primitives share their vertices.
 pub(super) struct Vertices {
     first: u32,
     used: Bits,
 }
 
 impl Vertices {
+    /// Those of so many corners; `None` if there are none.
+    pub fn of(corners: impl Iterator<Item = u32> + Clone) -> Option<Self> {
+        let (first, last) = bounds(corners.clone())?;
+        Some(Self::within(first, last, corners))
+    }
+
+    /// Those of so many corners, which are all between two.
+    fn within(first: u32, last: u32, corners: impl Iterator<Item = u32>) -> Self {
+        let mut used = Bits::new((last - first) as usize + 1);
+        corners.for_each(|vertex| used.set((vertex - first) as usize));
+        Self { first, used }
+    }
+
     /// Those that are used, rising.
     pub fn in_order(&self) -> impl Iterator<Item = u32> {
         self.used.set_places().map(|place| self.first + place as u32)

@@ -1,16 +1,14 @@
 //! One mesh of all that a scene shows.
 
 use super::Raw;
+use super::corners::{TOGETHER, attributes};
 use super::primitives::Part;
 use crate::mesh::check::MAX_TRIANGLES;
 use crate::mesh::color;
 use crate::mesh::lists::{List, Lists, no_room};
 use crate::mesh::material::{DEFAULT_DIFFUSE, Material};
-use crate::mesh::{Attributes, Image, Normal, ReadReport};
+use crate::mesh::{Attributes, Image, ReadReport};
 use glam::{DMat3, DMat4, DVec3, Vec3};
-
-/// How many triangles pass between two reports of progress.
-const TRIANGLES_PER_REPORT: u32 = 1 << 16;
 
 /// A mesh that grows, primitive by primitive.
 pub(super) struct Builder<L: Lists> {
@@ -91,17 +89,20 @@ impl<L: Lists> Builder<L> {
         let mirrored = linear.determinant() < 0.0;
         let sign = if mirrored { -1.0 } else { 1.0 };
         let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
+        let mut together = Vec::new();
         for number in 0..part.triangles as u32 {
-            if number.is_multiple_of(TRIANGLES_PER_REPORT) {
-                progress(self.triangles.len() as f32 / self.total as f32);
-            }
             let mut corners = part.triangle(number);
             if mirrored {
                 corners.swap(1, 2);
             }
             self.triangles.push(corners.map(|vertex| base + numbers.of(vertex)));
-            if let Some(attributes) = &mut self.attributes {
-                attributes.push(attributes_of(part, corners, &turn, &mut self.bad_uv));
+            together.push(corners);
+            if together.len() == TOGETHER || number + 1 == part.triangles as u32 {
+                if let Some(list) = &mut self.attributes {
+                    self.bad_uv += attributes(part, &together, &turn, |attributes| list.push(attributes));
+                }
+                together.clear();
+                progress(self.triangles.len() as f32 / self.total as f32);
             }
         }
         if let Some(of_triangle) = &mut self.of_triangle {
@@ -137,27 +138,4 @@ impl<L: Lists> Builder<L> {
         let of_materials = of_triangle.map(|of_triangle| (materials, of_triangle));
         Raw { positions, triangles, attributes, of_vertices, of_materials, images }
     }
-}
-
-/// What a triangle's corners have; texture coordinates that are none are counted.
-#[inline]
-fn attributes_of(part: &Part<'_>, corners: [u32; 3], turn: &DMat3, bad_uv: &mut u64) -> Attributes {
-    let mut attributes = Attributes::NONE;
-    if let Some(uv) = &part.uv {
-        attributes.uv = corners.map(|vertex| {
-            let [u, v] = uv.numbers(vertex);
-            // Ours runs upward.
-            let uv = [u, 1.0 - v];
-            let finite = u.is_finite() && v.is_finite();
-            *bad_uv += u64::from(!finite);
-            if finite { uv } else { [0.0; 2] }
-        });
-    }
-    if let Some(normals) = &part.normals {
-        attributes.normals = corners.map(|vertex| {
-            let normal = DVec3::from_array(normals.numbers(vertex).map(f64::from));
-            (*turn * normal).try_normalize().map_or(Normal::NONE, |normal| Normal::encode(normal.as_vec3()))
-        });
-    }
-    attributes
 }
