@@ -8,7 +8,6 @@
 
 use super::blocks::Blocks;
 use super::stats::add;
-use super::sync::Ordering;
 use std::ops::Range;
 
 /// Bytes that one read brings at most, from a multiple of as many on.
@@ -22,7 +21,7 @@ impl Blocks {
         }
         self.make_room();
         // Where something has to go, it would go for what nobody may ever want.
-        if !self.brings_others || self.short.load(Ordering::Relaxed) {
+        if !self.brings_others || self.is_short() {
             self.load_into_room(block, false);
             return;
         }
@@ -82,7 +81,7 @@ mod tests {
     use super::super::loaders::Loaders;
     use super::super::plan::{CacheOptions, Plan};
     use super::super::source::Source;
-    use super::super::sync::{Arc, Mutex};
+    use super::super::sync::{Arc, Mutex, Ordering};
     use super::*;
     use crate::error::{Error, Result};
     use std::io;
@@ -150,7 +149,7 @@ mod tests {
     #[test]
     fn where_something_had_to_go_blocks_come_alone() {
         let (blocks, _loaders, reads) = blocks();
-        blocks.short.store(true, Ordering::Relaxed);
+        blocks.gone.store(1, Ordering::Relaxed);
         ask(&blocks, 5);
         blocks.load_with_others(5);
         assert_eq!((here(&blocks), reads.lock().expect("whole").pop()), (vec![5], Some(5..6)));

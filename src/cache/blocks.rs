@@ -61,8 +61,8 @@ pub struct Blocks {
     committed: AtomicUsize,
     limit: usize,
     most_committed: AtomicUsize,
-    /// Whether a block had to go since this was last cleared.
-    pub short: AtomicBool,
+    /// Blocks that had to go since this was last cleared.
+    pub gone: AtomicU32,
     /// How often a thread has waited since this was last cleared.
     pub waits: AtomicU32,
     /// When threads stop waiting.
@@ -109,7 +109,7 @@ impl Blocks {
             committed: AtomicUsize::new(0),
             limit: plan.all,
             most_committed: AtomicUsize::new(0),
-            short: AtomicBool::new(false),
+            gone: AtomicU32::new(0),
             waits: AtomicU32::new(0),
             deadline: Deadline::default(),
             failure: Mutex::default(),
@@ -220,8 +220,16 @@ impl Blocks {
     /// again, who would not find it here.
     fn retire(&self, gone: u32) {
         add(&self.counters.evictions, 1);
-        self.short.store(true, Ordering::Relaxed);
+        self.gone.fetch_add(1, Ordering::Relaxed);
         self.let_go(gone);
+    }
+
+    /// Whether memory is short: more than a few blocks had to go. A few always have to, where a set is full before the
+    /// others are.
+    pub fn is_short(&self) -> bool {
+        /// One in so many of all blocks that may be here is few.
+        const FEW: usize = 128;
+        self.gone.load(Ordering::Relaxed) as usize > self.limit / FEW
     }
 
     /// The same of a block that went for nothing that is needed: memory is not short for that.
@@ -499,7 +507,7 @@ mod tests {
                         if options.prefetch == Prefetch::Beside && random(50) == 0 {
                             // Room, and a new frame in which nothing had to go so far.
                             blocks.clear();
-                            blocks.short.store(false, Ordering::Relaxed);
+                            blocks.gone.store(0, Ordering::Relaxed);
                         }
                         let Ok(gathered) = blocks.gather(loaders, &wanted, || ()) else {
                             late.fetch_add(1, Ordering::Relaxed);

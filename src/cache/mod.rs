@@ -218,7 +218,8 @@ impl Cached {
 
     /// Begins a frame.
     pub fn begin_frame(&self) {
-        self.was_short.store(self.blocks.short.swap(false, Ordering::Relaxed), Ordering::Relaxed);
+        self.was_short.store(self.blocks.is_short(), Ordering::Relaxed);
+        self.blocks.gone.store(0, Ordering::Relaxed);
         self.waited.store(self.blocks.waits.swap(0, Ordering::Relaxed), Ordering::Relaxed);
         self.blocks.ahead.begin_frame();
     }
@@ -234,9 +235,9 @@ impl Cached {
         Glance::new(self)
     }
 
-    /// Whether blocks have had to go, in this frame or in the one before: then it pays to need few of them.
+    /// Whether more than a few blocks have had to go, in this frame or in the one before: then it pays to need few of them.
     pub fn is_short(&self) -> bool {
-        self.was_short.load(Ordering::Relaxed) || self.blocks.short.load(Ordering::Relaxed)
+        self.was_short.load(Ordering::Relaxed) || self.blocks.is_short()
     }
 
     /// The tree as this thread sees it, for one query.

@@ -215,7 +215,7 @@ fn play_beside(ways: usize, broken: Option<usize>, lists: &[List]) -> (Vec<usize
     let threads = start(&blocks, &loaders, lists);
     for _ in 0..3 {
         // Nothing had to go in this one so far.
-        blocks.short.store(false, Ordering::Relaxed);
+        blocks.gone.store(0, Ordering::Relaxed);
         thread::yield_now();
     }
     let came = threads.into_iter().map(|thread| thread.join().expect("no panic")).collect();
