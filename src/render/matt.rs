@@ -1,9 +1,9 @@
 //! Shading of a packet's hits: matt surfaces in key and ambient light, or the sky.
 //!
-//! The formulas are those for one point ([`unit_normal`], [`offset_point`], [`Light::from`], [`Ambient::irradiance`]),
-//! in loops over lanes that have no branches: compilers make vectors of the task's instruction set of them. Most of
-//! the time would otherwise go into one division and one square root after the other. Nothing in them fuses, so
-//! that every instruction set and every packet width gives the same bits.
+//! The formulas are those for one point ([`unit_normal`], [`offset_point`], [`Light::from`],
+//! [`irradiance`](crate::scene::Ambient::irradiance)), in loops over lanes that have no branches: compilers make vectors
+//! of the task's instruction set of them. Most of the time would otherwise go into one division and one square root
+//! after the other. Nothing in them fuses, so that every instruction set and every packet width gives the same bits.
 
 use super::offset::offset_point;
 use super::shade::{has_unit, unit_normal, unit_of};
@@ -231,10 +231,15 @@ impl<const W: usize> Task for AddKey<'_, W> {
     fn run<S: Simd>(self) {
         for ((shades, lit), occluded) in self.shades.iter_mut().zip(self.lit).zip(self.occluded) {
             let free = lit & !occluded;
+            if free == 0 {
+                continue;
+            }
+            // Bit by bit once, not once for each channel.
+            let is_free: [bool; W] = std::array::from_fn(|lane| free >> lane & 1 == 1);
             for (sum, key) in shades.sum.iter_mut().zip(&shades.key) {
                 for lane in 0..W {
                     let more = sum[lane] + key[lane];
-                    sum[lane] = if free >> lane & 1 == 1 { more } else { sum[lane] };
+                    sum[lane] = if is_free[lane] { more } else { sum[lane] };
                 }
             }
         }
