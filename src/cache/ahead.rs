@@ -99,14 +99,19 @@ impl Blocks {
             self.directory(block).failed(block);
             return;
         }
-        // Before it is here: at no time are more used, or gone unused, than have come.
-        add(&self.counters.prefetched, 1);
-        let (words, pins) = (&self.words, &self.pins);
-        if self.directory(block).arrived_ahead(block, words, pins, self.tick())
+        if self.came_unasked(block)
             && let Some(old) = self.ahead.came(block)
         {
-            self.directory(old).give_up_unused(old, words, pins, &mut |gone| self.let_go(gone));
+            let gone = &mut |gone| self.let_go(gone);
+            self.directory(old).give_up_unused(old, &self.words, &self.pins, gone);
         }
+    }
+
+    /// Says that a block has come that nobody had asked for; whether nobody needs it yet.
+    pub fn came_unasked(&self, block: u32) -> bool {
+        // Before it is here: at no time are more used, or gone unused, than have come.
+        add(&self.counters.prefetched, 1);
+        self.directory(block).arrived_ahead(block, &self.words, &self.pins, self.tick())
     }
 
     /// Reads a block to its place, for which there is room; whether it could be read. If not, the room is given

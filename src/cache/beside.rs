@@ -7,7 +7,6 @@
 //! have to go, they would drive out what is needed: with 16 % of the power plant in memory, a fifth of them was ever used.
 
 use super::blocks::Blocks;
-use super::stats::add;
 use std::ops::Range;
 
 /// Bytes that one read brings at most, from a multiple of as many on.
@@ -29,7 +28,9 @@ impl Blocks {
         let others = self.claim_beside(block);
         if others.len() > 1 && matches!(self.read(others.clone(), false), Ok(true)) {
             self.directory(block).arrived(block, &self.words, tick);
-            others.filter(|&other| other != block).for_each(|other| self.came_beside(other));
+            for other in others.filter(|&other| other != block) {
+                self.came_unasked(other);
+            }
             return;
         }
         // One of them alone may be what is wrong: the block is read by itself.
@@ -56,7 +57,7 @@ impl Blocks {
             return false;
         }
         if self.is_kept(block) {
-            self.came_beside(block);
+            self.came_unasked(block);
             return false;
         }
         let has_room = self.try_room();
@@ -64,13 +65,6 @@ impl Blocks {
             directory.failed(block);
         }
         has_room
-    }
-
-    /// Says that a block has come that nobody asked for.
-    fn came_beside(&self, block: u32) {
-        // Before it is here: at no time are more used, or gone unused, than have come.
-        add(&self.counters.prefetched, 1);
-        self.directory(block).arrived_ahead(block, &self.words, &self.pins, self.tick());
     }
 }
 

@@ -360,4 +360,6 @@ fn mebibytes(bytes: usize) -> String {
 }
 
 #[cfg(test)]
+mod stress;
+#[cfg(test)]
 mod tests;

@@ -250,20 +250,12 @@ impl<const W: usize> Task for AddKey<'_, W> {
 mod tests {
     use super::*;
     use crate::geometry::Hit;
-    use crate::mesh::Mesh;
     use crate::render::shade::Shader;
+    use crate::render::shade::tests::floor;
     use crate::scene::Ambient;
     use crate::simd::{Chosen, Isa};
     use glam::Vec3Swizzles;
     use proptest::prelude::*;
-
-    fn floor(size: f32) -> Mesh {
-        Mesh {
-            positions: vec![Vec3::ZERO, Vec3::Z * size, Vec3::X * size],
-            triangles: vec![[0, 1, 2]],
-            ..Mesh::default()
-        }
-    }
 
     const AMBIENT: Ambient =
         Ambient { up: Vec3::Y, toward: Vec3::Y, sky: Vec3::splat(0.5), ground: Vec3::ZERO };

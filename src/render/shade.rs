@@ -98,12 +98,13 @@ pub(super) fn unit_of(normal: Vec3) -> Vec3 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::mesh::Mesh;
     use crate::scene::{Ambient, Light};
 
-    fn floor(size: f32) -> Mesh {
+    /// A triangle in the plane of x and z.
+    pub fn floor(size: f32) -> Mesh {
         Mesh {
             positions: vec![Vec3::ZERO, Vec3::Z * size, Vec3::X * size],
             triangles: vec![[0, 1, 2]],
