@@ -127,7 +127,7 @@ impl Blocks {
         let is_read = matches!(read, Ok(true));
         if !is_read {
             self.ahead.failed.store(true, Ordering::Relaxed);
-            self.give_room(block);
+            self.give_room();
         }
         is_read
     }

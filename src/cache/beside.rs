@@ -7,10 +7,8 @@
 //! have to go, they would drive out what is needed: with 16 % of the power plant in memory, a fifth of them was ever used.
 
 use super::blocks::Blocks;
+use super::pieces::READ;
 use std::ops::Range;
-
-/// Bytes that one read brings at most, from a multiple of as many on.
-const READ: usize = 16 << 10;
 
 impl Blocks {
     /// As [`load`](Self::load) without haste, and what lies beside the block comes with it.
@@ -35,7 +33,7 @@ impl Blocks {
         }
         // One of them alone may be what is wrong: the block is read by itself.
         for other in others.filter(|&other| other != block) {
-            self.give_room(other);
+            self.give_room();
             self.directory(other).failed(other);
         }
         self.load_into_room(block, false);
@@ -44,6 +42,7 @@ impl Blocks {
     /// The blocks around one that is about to be read that are absent as well, have room, and from now on are this
     /// thread's to read.
     fn claim_beside(&self, block: u32) -> Range<u32> {
+        // From a multiple of as many bytes on.
         let near = self.layout.beside(block, READ);
         let end = (block + 1..near.end).find(|&other| !self.claim(other)).unwrap_or(near.end);
         let before = (near.start..block).rev().find(|&other| !self.claim(other));

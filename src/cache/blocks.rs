@@ -5,30 +5,30 @@
 //! it any more.
 
 use super::ahead::Ahead;
-use super::arena::Arena;
 use super::deadline::Deadline;
 use super::directory::{Asked, Directory, Pins};
 use super::epoch::Epochs;
 use super::gate::Gate;
+use super::known::Known;
 use super::layout::Layout;
 use super::loaders::Loaders;
+use super::pieces::{self, PIECE};
 use super::plan::{CacheOptions, Loading, Plan, Prefetch};
+use super::policy::Way;
 use super::quota::Quota;
+use super::retired::Retired;
+use super::slots::Slots;
 use super::source::Source;
 use super::stats::{CacheStats, Counters, add, nanos};
 use super::sync::thread;
 use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, MutexGuard, Ordering, PoisonError};
 use super::words::Words;
 use crate::error::Error;
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// The most threads that may read at a time.
 const READERS: usize = 4096;
-
-/// What lengths of reads are multiples of: what checksums are for.
-const READ: usize = 4096;
 
 /// Squares of a picture that a tick is long. Every block's first use in a tick is written down, and lists are looked at
 /// anew ([`known`](super::known)): with a tick of one square, a view of which all was in memory ran at 0.58 to 0.67 of the
@@ -39,13 +39,19 @@ const SESSIONS_PER_TICK: u32 = 64;
 #[derive(Debug)]
 pub struct Blocks {
     pub layout: Layout,
-    pub arena: Arena,
+    pub slots: Slots,
     pub words: Words,
     pub epochs: Arc<Epochs>,
     /// For threads that are at work: none, if each waits at its own place.
     pub gate: Option<Gate>,
     /// Sessions so far: see [`tick`](Self::tick).
     pub sessions: AtomicU32,
+    /// What threads knew that have ended, for the next ones.
+    knowledge: Mutex<Vec<Known>>,
+    /// Lines that each of them has.
+    lines: usize,
+    /// Whether nothing ever has to go.
+    holds_all: bool,
     pub counters: Counters,
     pub pins: Pins,
     /// What came ahead of need.
@@ -55,8 +61,8 @@ pub struct Blocks {
     quota: Quota,
     directories: [Option<Directory>; 2],
     source: Box<dyn Source>,
-    /// Blocks given up, with the epoch that they are retired at, oldest first.
-    retired: Mutex<VecDeque<(u64, u32)>>,
+    /// Blocks given up that still have their slots.
+    retired: Mutex<Retired>,
     /// Blocks that have memory, or are about to: at most `limit`.
     committed: AtomicUsize,
     limit: usize,
@@ -93,11 +99,14 @@ impl Blocks {
         let ahead = (loaders / 2).max(1).min(plan.ahead / 2);
         let gate = matches!(options.loading, Loading::Asynchronous { .. }).then(|| Gate::new(threads));
         let blocks = Arc::new(Self {
-            arena: Arena::new(count << layout.shift())?,
+            slots: Slots::new(count, plan.all, layout.shift())?,
             words: Words::new(count),
             epochs: Epochs::new(READERS),
             gate,
             sessions: AtomicU32::new(0),
+            knowledge: Mutex::default(),
+            lines: plan.lines,
+            holds_all: plan.held() >= count,
             counters: Counters::default(),
             pins: Pins::new(count),
             ahead: Ahead::new(plan.ahead - ahead),
@@ -125,10 +134,30 @@ impl Blocks {
         self.sessions.load(Ordering::Relaxed) / SESSIONS_PER_TICK
     }
 
-    /// Memory that is taken for `count` blocks beside their own.
+    /// From now on, writes uses down, or no longer does. Where nothing ever has to go, it is enough to know which blocks
+    /// were used at all.
+    pub fn trace_uses(&self, on: bool) {
+        self.words.trace(on, !self.holds_all);
+    }
+
+    /// What a thread knew that has ended; nothing if there is none.
+    pub fn knowledge(&self) -> Known {
+        let known = self.knowledge.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        known.unwrap_or_else(|| Known::new(self.lines))
+    }
+
+    /// Keeps what a thread knew for another.
+    pub fn pass_on(&self, known: Known) {
+        self.knowledge.lock().unwrap_or_else(PoisonError::into_inner).push(known);
+    }
+
+    /// Memory that is taken for a block that is here beside its own: its way in a set, and what slots and the list of those
+    /// that were given up have, each with room to grow.
+    pub const OVERHEAD_HERE: usize = 2 * (size_of::<Way>() + 3 * size_of::<u64>());
+
+    /// Memory that is taken for `count` blocks, wherever they are.
     pub fn overhead(count: usize) -> usize {
-        // Sets, their policies and hash tables come to some 64 bytes for a block that is here; few are.
-        Words::bytes(count) + Pins::bytes(count) + READERS * 128
+        Words::bytes(count) + Pins::bytes(count) + Slots::bytes(count) + READERS * 128
     }
 
     pub fn directory(&self, block: u32) -> &Directory {
@@ -234,11 +263,13 @@ impl Blocks {
 
     /// The same of a block that went for nothing that is needed: memory is not short for that.
     pub fn let_go(&self, gone: u32) {
+        // Before the epoch ends: who enters a later one knows it.
+        self.slots.leave_order(|| self.epochs.retire());
         let mut retired = self.retired();
-        retired.push_back((self.epochs.retire(), gone));
+        retired.push(self.epochs.retire(), gone);
     }
 
-    fn retired(&self) -> MutexGuard<'_, VecDeque<(u64, u32)>> {
+    fn retired(&self) -> MutexGuard<'_, Retired> {
         self.retired.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -246,24 +277,12 @@ impl Blocks {
     fn reclaim(&self) -> bool {
         let mut retired = self.retired();
         let earliest = self.epochs.earliest();
-        let mut freed = 0;
-        while retired.front().is_some_and(|&(epoch, _)| epoch < earliest) {
-            let Some((_, block)) = retired.pop_front() else { break };
-            // SAFETY: it was declared gone before all epochs that a reader may be in, and it can only come
-            // back by being taken out of the list, whose lock is held.
-            unsafe { self.release(block) };
-            freed += 1;
-        }
-        self.committed.fetch_sub(freed, Ordering::AcqRel);
-        freed > 0
-    }
-
-    /// # Safety
-    /// Nobody may have a reference into the block.
-    unsafe fn release(&self, block: u32) {
-        let bytes = self.layout.block_bytes();
-        // SAFETY: as promised.
-        unsafe { self.arena.release(block as usize * bytes, bytes) };
+        let free = retired.take_before(earliest);
+        // SAFETY: they were declared gone before all epochs that a reader may be in, and they can only come back by being
+        // taken out of the list, whose lock is held.
+        unsafe { self.slots.give_back(&free) };
+        self.committed.fetch_sub(free.len(), Ordering::AcqRel);
+        !free.is_empty()
     }
 
     /// Waits until there is memory for one more block, and takes it.
@@ -336,13 +355,13 @@ impl Blocks {
             }
             Ok(false) => {
                 // A loader will come back to it, and find the room again.
-                self.give_room(block);
+                self.give_room();
                 false
             }
             Err(error) => {
                 self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 self.failed.store(true, Ordering::Release);
-                self.give_room(block);
+                self.give_room();
                 self.directory(block).failed(block);
                 true
             }
@@ -352,38 +371,42 @@ impl Blocks {
     /// Whether a block that the directory has said is absent was given up just now: then it is still where it was,
     /// and is kept.
     pub fn is_kept(&self, block: u32) -> bool {
-        let mut retired = self.retired();
-        let at = retired.iter().position(|&(_, gone)| gone == block);
-        at.and_then(|at| retired.remove(at)).is_some()
+        // Whoever brought it or gave it up had its stripe's lock before this thread.
+        self.slots.has(block) && self.retired().keep(block)
     }
 
-    /// Reads blocks of one array that the directory has said are absent to their places, for which there is room.
+    /// Reads blocks of one array that the directory has said are absent, for which there is room, and gives them slots.
     /// `at_once` as in [`load`](Self::load): `false` if something would have to be waited for.
     pub fn read(&self, blocks: Range<u32>, at_once: bool) -> crate::error::Result<bool> {
         let start = Instant::now();
         let (array, byte, bytes) = self.layout.locate(blocks.clone());
-        let place = (blocks.start as usize) << self.layout.shift();
-        // SAFETY: readers look only at what is here; the blocks are not, their last memory has been freed, and
-        // the directory tells one thread alone to load them.
-        let into = unsafe { self.arena.fill(place, bytes.next_multiple_of(READ)) };
+        // What is read is looked at before anybody else can see it: checksums are for whole pieces.
+        let pieces = byte / PIECE..(byte + bytes).div_ceil(PIECE);
+        let mut room = pieces::take(pieces.len());
+        let into = room.bytes_mut();
         let is_read = if at_once {
-            self.source.read_at_once(array, byte, into)?
+            self.source.read_at_once(array, pieces.start * PIECE, into)?
         } else {
-            self.source.read(array, byte, into)?;
+            self.source.read(array, pieces.start * PIECE, into)?;
             true
         };
         if is_read {
+            let read = &into[byte - pieces.start * PIECE..][..bytes];
+            for (block, bytes) in blocks.clone().zip(read.chunks(self.layout.block_bytes())) {
+                // SAFETY: the directory tells one thread alone to load a block.
+                unsafe { self.slots.put(block, bytes, || self.epochs.earliest()) };
+            }
             add(&self.counters.loads, blocks.len() as u64);
-            add(&self.counters.bytes_read, bytes as u64);
+            let end = self.layout.column(array).bytes.min(pieces.end * PIECE);
+            add(&self.counters.bytes_read, (end - pieces.start * PIECE) as u64);
             add(&self.counters.loading_ns, nanos(start.elapsed()));
         }
+        pieces::put_back(room);
         Ok(is_read)
     }
 
-    /// Gives back the memory of a block that has not come.
-    pub fn give_room(&self, block: u32) {
-        // SAFETY: it never was here.
-        unsafe { self.release(block) };
+    /// Gives back the room of a block that has not come.
+    pub fn give_room(&self) {
         self.committed.fetch_sub(1, Ordering::AcqRel);
     }
 
@@ -416,6 +439,7 @@ impl Blocks {
         }
         self.ahead.clear();
         self.reclaim();
+        self.slots.begin_anew();
     }
 }
 

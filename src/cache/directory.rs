@@ -10,10 +10,9 @@
 
 use super::deadline::Deadline;
 use super::policy::{Policy, Replacement, Use, Way};
-use super::sync::{AtomicU16, Condvar, Mutex, MutexGuard, Ordering, PoisonError};
+use super::sync::{AtomicU16, AtomicUsize, Condvar, Mutex, MutexGuard, Ordering, PoisonError};
 use super::words::Words;
 use crossbeam::utils::CachePadded;
-use std::collections::HashSet;
 
 /// How a cache is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +50,8 @@ pub enum Asked {
 pub struct Directory {
     shape: Shape,
     stripes: Box<[CachePadded<Stripe>]>,
+    /// Blocks that sets hold or wait for, in all.
+    held: CachePadded<AtomicUsize>,
 }
 
 #[derive(Debug)]
@@ -62,8 +63,10 @@ struct Stripe {
 #[derive(Debug)]
 struct Sets {
     sets: Vec<Set>,
-    /// Blocks on their way.
-    coming: HashSet<u32>,
+    /// Blocks on their way: a stripe's share of what threads have asked for, few enough to look through.
+    coming: Vec<u32>,
+    /// Threads that wait for one of them: to wake nobody takes a call to the system.
+    waiting: usize,
 }
 
 #[derive(Debug)]
@@ -113,10 +116,19 @@ impl Set {
     }
 }
 
+impl Stripe {
+    /// Wakes those that wait for what was on its way.
+    fn wake(&self, sets: &Sets) {
+        if sets.waiting > 0 {
+            self.arrived.notify_all();
+        }
+    }
+}
+
 impl Sets {
     /// A block that was on its way to a set is here, and was used so.
     fn arrived(&mut self, at: usize, block: u32, seen: Use) {
-        self.coming.remove(&block);
+        self.coming.retain(|&other| other != block);
         let set = &mut self.sets[at];
         set.coming -= 1;
         let mut way = Way { block, seen, mark: 0 };
@@ -132,10 +144,29 @@ impl Directory {
         let set = || Set { ways: Vec::new(), policy: shape.policy.policy(shape.ways), coming: 0 };
         let stripe = || {
             let sets = (0..shape.sets.div_ceil(shape.stripes)).map(|_| set()).collect();
-            let sets = Mutex::new(Sets { sets, coming: HashSet::new() });
+            let sets = Mutex::new(Sets { sets, coming: Vec::new(), waiting: 0 });
             CachePadded::new(Stripe { sets, arrived: Condvar::new() })
         };
-        Self { shape, stripes: (0..shape.stripes).map(|_| stripe()).collect() }
+        let stripes = (0..shape.stripes).map(|_| stripe()).collect();
+        Self { shape, stripes, held: CachePadded::default() }
+    }
+
+    /// Blocks that a set with so many may hold at the moment. As long as there is room for more in all, as many as come:
+    /// otherwise some sets would have to give blocks up that others have room for. From then on, what has more than its
+    /// ways gives up two for each that comes.
+    fn ways(&self, held: usize) -> usize {
+        let blocks = self.shape.blocks();
+        let has_room = self.held.load(Ordering::Relaxed) < blocks - blocks.div_ceil(16);
+        if has_room { usize::MAX } else { self.shape.ways.max(held.saturating_sub(2)) }
+    }
+
+    /// Has a set be within what it may hold, and counts what goes.
+    fn make_room(&self, set: &mut Set, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
+        let counted = &mut |block| {
+            self.held.fetch_sub(1, Ordering::Relaxed);
+            gone(block);
+        };
+        set.make_room(self.ways(set.ways.len() + set.coming), words, pins, counted);
     }
 
     /// A block's stripe, locked, and its set's place there.
@@ -167,11 +198,15 @@ impl Directory {
     /// Asks for an absent block that has a way free in its set: whether it is that, and now the caller's to bring.
     pub fn claim(&self, block: u32, words: &Words) -> bool {
         let (_, mut sets, at) = self.lock(block);
-        let Sets { sets, coming } = &mut *sets;
+        let Sets { sets, coming, .. } = &mut *sets;
         let set = &mut sets[at];
         let has_way = set.ways.len() + set.coming < self.shape.ways;
-        let is_absent = has_way && !words.is_here(block as usize) && coming.insert(block);
-        set.coming += usize::from(is_absent);
+        let is_absent = has_way && !words.is_here(block as usize) && !coming.contains(&block);
+        if is_absent {
+            coming.push(block);
+            set.coming += 1;
+            self.held.fetch_add(1, Ordering::Relaxed);
+        }
         is_absent
     }
 
@@ -187,12 +222,14 @@ impl Directory {
         if words.is_here(block as usize) {
             return Asked::Here;
         }
-        if !sets.coming.insert(block) {
+        if sets.coming.contains(&block) {
             return Asked::Coming;
         }
+        sets.coming.push(block);
         let set = &mut sets.sets[at];
         set.coming += 1;
-        set.make_room(self.shape.ways, words, pins, gone);
+        self.held.fetch_add(1, Ordering::Relaxed);
+        self.make_room(set, words, pins, gone);
         Asked::Absent
     }
 
@@ -200,7 +237,7 @@ impl Directory {
     pub fn arrived(&self, block: u32, words: &Words, tick: u32) {
         let (stripe, mut sets, at) = self.lock(block);
         sets.arrived(at, block, words.arrive(block as usize, tick));
-        stripe.arrived.notify_all();
+        stripe.wake(&sets);
     }
 
     /// The block has come ahead of need; whether nobody needs it yet.
@@ -210,7 +247,7 @@ impl Directory {
         let is_needed = pins.is_pinned(block);
         let arrive = if is_needed { Words::arrive_used } else { Words::arrive_ahead };
         sets.arrived(at, block, arrive(words, block as usize, tick));
-        stripe.arrived.notify_all();
+        stripe.wake(&sets);
         !is_needed
     }
 
@@ -219,6 +256,7 @@ impl Directory {
         let (_, mut sets, at) = self.lock(block);
         if !pins.is_pinned(block) && words.leave_unused(block as usize) {
             sets.sets[at].ways.retain(|way| way.block != block);
+            self.held.fetch_sub(1, Ordering::Relaxed);
             gone(block);
         }
     }
@@ -226,31 +264,41 @@ impl Directory {
     /// The block will not come.
     pub fn failed(&self, block: u32) {
         let (stripe, mut sets, at) = self.lock(block);
-        sets.coming.remove(&block);
+        sets.coming.retain(|&other| other != block);
         sets.sets[at].coming -= 1;
-        stripe.arrived.notify_all();
+        self.held.fetch_sub(1, Ordering::Relaxed);
+        stripe.wake(&sets);
     }
 
     /// Waits until a pinned block has come, or has failed to; whether that was before the deadline.
     pub fn wait(&self, block: u32, deadline: &Deadline) -> bool {
         let (stripe, mut sets, _) = self.lock(block);
         while sets.coming.contains(&block) {
-            sets = match deadline.left() {
+            let left = deadline.left();
+            if left.is_some_and(|left| left.is_zero()) {
+                return false;
+            }
+            sets.waiting += 1;
+            sets = match left {
                 None => stripe.arrived.wait(sets).unwrap_or_else(PoisonError::into_inner),
-                Some(left) if left.is_zero() => return false,
                 Some(left) => {
                     stripe.arrived.wait_timeout(sets, left).unwrap_or_else(PoisonError::into_inner).0
                 }
             };
+            sets.waiting -= 1;
         }
         true
     }
 
     /// Declares blocks gone that sets hold beyond their ways, but for pinned ones, and tells `gone`.
     pub fn shrink(&self, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
+        let counted = &mut |block| {
+            self.held.fetch_sub(1, Ordering::Relaxed);
+            gone(block);
+        };
         for stripe in &self.stripes {
             let mut sets = stripe.sets.lock().unwrap_or_else(PoisonError::into_inner);
-            sets.sets.iter_mut().for_each(|set| set.make_room(self.shape.ways, words, pins, gone));
+            sets.sets.iter_mut().for_each(|set| set.make_room(self.shape.ways, words, pins, counted));
         }
     }
 
@@ -262,6 +310,7 @@ impl Directory {
                 set.ways.retain(|way| {
                     let stays = pins.is_pinned(way.block);
                     if !stays {
+                        self.held.fetch_sub(1, Ordering::Relaxed);
                         words.leave(way.block as usize);
                         gone(way.block);
                     }
@@ -297,7 +346,7 @@ mod tests {
     impl Small {
         fn new(sets: usize, ways: usize) -> Self {
             let shape = Shape { stripes: 1, sets, ways, policy: Replacement::Fifo };
-            Self { directory: Directory::new(shape), words: Words::new(100), pins: Pins::new(100) }
+            Self { directory: Directory::new(shape), words: Words::new(200), pins: Pins::new(200) }
         }
 
         fn pin(&self, block: u32) -> (Asked, Vec<u32>) {
@@ -358,6 +407,26 @@ mod tests {
         assert!(deadline.has_passed());
         small.arrived(1);
         assert!(small.directory.wait(1, &deadline), "it is here: there is nothing to wait for");
+    }
+
+    #[test]
+    fn a_full_set_holds_more_while_others_have_room() {
+        let small = Small::new(8, 2);
+        // All of one set, until there is hardly room for more in all.
+        let come = |block| {
+            let (asked, gone) = small.pin(block);
+            assert_eq!(asked, Asked::Absent, "{block}");
+            small.arrived(block);
+            small.pins.unpin(block);
+            assert_eq!(small.directory.len(), small.directory.held.load(Ordering::Relaxed));
+            gone
+        };
+        assert!((0..14).all(|i| come(8 * i).is_empty()));
+        assert_eq!(come(8 * 14), [0, 8], "two for one");
+        assert!(come(1).is_empty(), "its own set has room");
+        small.directory.shrink(&small.words, &small.pins, &mut |_| ());
+        assert_eq!(small.directory.len(), 3, "two of the full set");
+        assert!((2..10).all(|i| come(8 * i + 2).is_empty()), "there is room again");
     }
 
     #[test]

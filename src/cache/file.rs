@@ -111,7 +111,7 @@ fn open(path: &Path, direct: bool) -> io::Result<fs::File> {
     #[cfg(target_os = "linux")]
     if direct {
         use std::os::unix::fs::OpenOptionsExt;
-        // Blocks, sections and the arena are aligned as that demands.
+        // Pieces and sections are aligned as that demands.
         options.custom_flags(libc::O_DIRECT);
     }
     #[cfg(not(target_os = "linux"))]

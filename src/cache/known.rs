@@ -2,82 +2,230 @@
 //!
 //! A page's list names some fifty triangles, each of which lies in a block with a word of its own. Neighbouring
 //! packets and beams come to the same pages and leaves one after the other, and looked at all of these words each
-//! time. So a thread keeps in mind which lists it has seen whole: where everything was here, that and longer ticks took
-//! scenes from 0.83 to 0.87 of the resident ones' speed.
+//! time. So a thread keeps in mind which lists it has seen whole; and when it ends, with its frame, the next one goes on
+//! with what it knew.
 //!
 //! **How long that holds.** Whatever is given up moves the epoch on, before its memory can go (`epoch.rs`, 4). A list
-//! that was seen whole in a use that began in one epoch is whole in every use that begins in the same one: what was
-//! given up since, if anything, was declared gone but not yet retired when that use began, and so is not freed before
-//! it ends. A tick ends it too: what is used in the next one is to be marked again.
+//! that was seen whole in a use that began in one epoch is whole in every use that begins in the same one, be it another
+//! thread's: what was given up since, if anything, was declared gone but not yet retired when that use began, and so is
+//! not freed before it ends.
+//!
+//! **What policies know.** A list that is known is not marked as used again. Policies are asked only when something has
+//! to go, and from then on, in another epoch, every list is looked at anew: marks are at most as old as the last
+//! time that something went. So that what was seen a thousand frames before is not taken for what is in view, an *era*
+//! ends in any case after [`TICKS`].
+//!
+//! **How it is kept.** A line of the cache for the lists that begin in 448 words after one another, which are those of
+//! some forty neighbouring leaves, or eight pages:
+//!
+//! ```text
+//!            63                     24 23       8 7         0
+//!           +-------------------------+----------+-----------+
+//! tag       | which 448 words         | era      | last tick |   era 0: nothing
+//!           +-------------------------+----------+-----------+
+//! 7 words   | a bit for each of the words: is it the first of a list that was seen? |
+//!           +-----------------------------------------------------------------------+
+//! ```
 
 use std::cell::Cell;
+use std::ops::Range;
 
-/// Lists that are kept in mind. Each has one place where it can be.
-const LISTS: usize = 512;
+/// Lines that a thread has, as far as the memory allows. Each list has one line where it can be.
+const LINES: Range<usize> = 128..1 << 14;
 
-/// A list, and what must still be the same for it to be whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Seen {
-    list: usize,
-    epoch: u64,
-    tick: u32,
+/// Ticks in an era: 64 frames of 512 x 512.
+const TICKS: u32 = 1024;
+
+const TICK_BITS: u32 = 8;
+const ERA_BITS: u32 = 16;
+
+/// Words that a line is for.
+const WORDS: usize = 7 * 64;
+
+/// Neighbouring lists.
+#[derive(Debug, Default)]
+#[repr(align(64))]
+struct Line {
+    tag: Cell<u64>,
+    begin: [Cell<u64>; WORDS / 64],
 }
 
-/// No epoch is as late as this.
-const NOTHING: Seen = Seen { list: 0, epoch: u64::MAX, tick: 0 };
-
 /// What one thread keeps in mind.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Known {
-    seen: Box<[Cell<Seen>; LISTS]>,
+    lines: Box<[Line]>,
+    /// From 1 to 2^16 - 1.
+    era: Cell<u64>,
+    /// The epoch and the part of all ticks that the era is.
+    now: Cell<(u64, u32)>,
+    /// First uses in a tick of lists that were known.
+    uses: Cell<u64>,
 }
 
 impl Known {
-    /// Nothing.
-    pub fn new() -> Self {
-        Self { seen: Box::new([const { Cell::new(NOTHING) }; LISTS]) }
+    /// Nothing, with as many lines as [`lines`](Self::lines) has said.
+    pub fn new(lines: usize) -> Self {
+        debug_assert!(lines.is_power_of_two());
+        Self { lines: (0..lines).map(|_| Line::default()).collect(), ..Self::default() }
+    }
+
+    /// How many lines a thread should have where so many of them share `memory` bytes of blocks: about a hundredth
+    /// goes into them.
+    pub fn lines(memory: usize, threads: usize) -> usize {
+        let most = memory / 100 / threads.max(1) / size_of::<Line>();
+        (most.clamp(LINES.start, LINES.end) + 1).next_power_of_two() / 2
     }
 
     /// Memory of one.
-    pub const fn bytes() -> usize {
-        LISTS * size_of::<Seen>()
+    pub const fn bytes(lines: usize) -> usize {
+        lines * size_of::<Line>()
     }
 
-    /// Whether a list, by where its array and it begin, was seen whole in this epoch and tick.
+    /// A use begins, or goes on, in an epoch.
     #[inline(always)]
-    pub fn has(&self, list: usize, epoch: u64, tick: u32) -> bool {
-        self.seen[place(list)].get() == Seen { list, epoch, tick }
+    pub fn begin(&self, epoch: u64, tick: u32) {
+        let now = (epoch, tick / TICKS);
+        if self.now.get() != now || self.era.get() == 0 {
+            self.now.set(now);
+            self.next_era();
+        }
+    }
+
+    fn next_era(&self) {
+        let mut era = self.era.get() + 1;
+        if era >> ERA_BITS != 0 {
+            // The first ones' numbers come again.
+            self.lines.iter().for_each(|line| line.tag.set(0));
+            era = 1;
+        }
+        self.era.set(era);
+    }
+
+    /// Whether a list was seen whole in this era: the one that begins at this of all arrays' words.
+    #[inline(always)]
+    pub fn has(&self, list: usize, tick: u32) -> bool {
+        let (line, now, bit) = self.find(list, tick);
+        let (seen, word) = (line.tag.get(), line.begin[bit / 64].get());
+        let has = (seen ^ now) >> TICK_BITS == 0 && word >> (bit % 64) & 1 != 0;
+        if has && seen != now {
+            line.tag.set(now);
+            self.uses.set(self.uses.get() + 1);
+        }
+        has
     }
 
     /// Keeps in mind that it was.
     #[inline(always)]
-    pub fn add(&self, list: usize, epoch: u64, tick: u32) {
-        self.seen[place(list)].set(Seen { list, epoch, tick });
+    pub fn add(&self, list: usize, tick: u32) {
+        let (line, now, bit) = self.find(list, tick);
+        if (line.tag.get() ^ now) >> TICK_BITS != 0 {
+            // Others were here, or it was another era.
+            line.begin.iter().for_each(|word| word.set(0));
+        }
+        line.tag.set(now);
+        let word = &line.begin[bit / 64];
+        word.set(word.get() | 1 << (bit % 64));
     }
-}
 
-/// Where a list is kept: lists that follow one another lie apart (Fibonacci hashing: Knuth, "The Art of Computer
-/// Programming", volume 3, 6.4).
-#[inline(always)]
-fn place(list: usize) -> usize {
-    ((list as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - LISTS.trailing_zeros())) as usize
+    /// A list's line, the tag that it has if the list was seen now, and the list's bit.
+    #[inline(always)]
+    fn find(&self, list: usize, tick: u32) -> (&Line, u64, usize) {
+        let (place, bit) = (list / WORDS, list % WORDS);
+        // An array of a hundred terabytes is not in sight.
+        debug_assert!((place as u64) >> (u64::BITS - ERA_BITS - TICK_BITS) == 0);
+        // Of two ticks that are taken for one, a use is not counted.
+        let tick = u64::from(tick) & ((1 << TICK_BITS) - 1);
+        let tag = ((place as u64) << ERA_BITS | self.era.get()) << TICK_BITS | tick;
+        (&self.lines[place & (self.lines.len() - 1)], tag, bit)
+    }
+
+    /// First uses in a tick of lists that were known, since the last call.
+    pub fn take_uses(&self) -> u64 {
+        self.uses.take()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn known() -> Known {
+        let known = Known::new(128);
+        known.begin(0, 0);
+        known
+    }
+
     #[test]
-    fn a_list_is_known_in_its_epoch_and_tick_alone() {
-        let known = Known::new();
-        assert!(!known.has(0, 0, 0));
-        for list in 0..20 {
-            known.add(40 * list, 7, 3);
-            assert!(known.has(40 * list, 7, 3));
-            assert!(!known.has(40 * list + 1, 7, 3));
-            assert!(!known.has(40 * list, 8, 3) && !known.has(40 * list, 7, 4));
+    fn a_list_is_known_in_its_epoch_alone() {
+        let known = known();
+        assert!(!known.has(0, 0));
+        for list in (0..800).step_by(40) {
+            known.begin(7, 3);
+            known.add(list, 3);
+            assert!(known.has(list, 3));
+            assert!(!known.has(list + 1, 3) && !known.has(list + 40, 3));
+            // What would have the same line and bit.
+            assert!(!known.has(list + 128 * WORDS, 3));
+            known.begin(7, TICKS - 1);
+            assert!(known.has(list, TICKS - 1));
+            known.begin(8, 3);
+            assert!(!known.has(list, 3));
         }
-        let kept = (0..20).filter(|list| known.has(40 * list, 7, 3)).count();
-        assert!(kept > 16, "{kept} of 20 lists have a place of their own");
+        known.begin(9, 3);
+        (0..60_000).filter(|list| list % 7 == 0).for_each(|list| known.add(list, 3));
+        // Those that came last are there, each in its place, and the first ones had to go.
+        let first = 60_000_usize.div_ceil(WORDS) - 128;
+        for list in 0..60_000 {
+            assert_eq!(known.has(list, 3), list % 7 == 0 && list >= first * WORDS, "{list}");
+        }
+    }
+
+    #[test]
+    fn an_era_ends_with_its_ticks() {
+        let known = known();
+        for (tick, is_known) in [(0, false), (TICKS - 1, true), (TICKS, false), (2 * TICKS - 1, true)] {
+            known.begin(0, tick);
+            assert_eq!(known.has(40, tick), is_known, "{tick}");
+            known.add(40, tick);
+        }
+    }
+
+    #[test]
+    fn known_neighbours_are_used_once_in_a_tick() {
+        let known = known();
+        known.add(40, 0);
+        known.add(47, 0);
+        for tick in [0, 0, 1, 1, 2] {
+            known.begin(0, tick);
+            assert!(known.has(40, tick) && known.has(47, tick));
+        }
+        assert_eq!((known.take_uses(), known.take_uses()), (2, 0));
+    }
+
+    #[test]
+    fn numbers_of_eras_that_come_again_are_others() {
+        let known = known();
+        known.add(40, 0);
+        known.era.set((1 << ERA_BITS) - 1);
+        known.add(80, 0);
+        assert!(known.has(80, 0));
+        known.begin(1, 0);
+        assert_eq!(known.era.get(), 1, "that of the first list");
+        assert!(!known.has(40, 0) && !known.has(80, 0) && !known.has(0, 0));
+    }
+
+    #[test]
+    fn lines_are_a_power_of_two_within_a_hundredth() {
+        for (memory, threads, lines) in [
+            (0, 1, 128),
+            (1 << 20, 2, 128),
+            (48 << 20, 16, 1 << 8),
+            (48 << 20, 2, 1 << 11),
+            (500_000_000, 2, 1 << 14),
+            (1 << 40, 1, 1 << 14),
+        ] {
+            assert_eq!(Known::lines(memory, threads), lines, "{memory} bytes, {threads} threads");
+        }
+        assert_eq!(size_of::<Line>(), 64);
     }
 }

@@ -38,9 +38,9 @@ impl Array {
 }
 
 /// The least and the greatest size of a block.
-pub const BLOCK_BYTES: Range<usize> = 4096..(1 << 16) + 1;
+pub const BLOCK_BYTES: Range<usize> = 512..(1 << 16) + 1;
 
-/// An array's place in the arena.
+/// An array's place among the bytes of all.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
     /// Its first byte, at the start of a block.
@@ -59,7 +59,7 @@ pub struct Layout {
 
 impl Layout {
     /// Lays out arrays of so many bytes in blocks of `block` bytes. Panics if that is no power of two
-    /// between 4 and 64 KiB.
+    /// between half a KiB and 64 KiB.
     pub fn new(bytes: [usize; Array::ALL.len()], block: usize) -> Self {
         assert!(block.is_power_of_two() && BLOCK_BYTES.contains(&block));
         let mut end = 0;

@@ -3,6 +3,7 @@
 use super::blocks::Blocks;
 use super::epoch::Reader;
 use super::known::Known;
+use super::scraps::Scraps;
 use super::stats::{add, nanos};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -13,9 +14,10 @@ use std::time::Duration;
 pub struct Local {
     blocks: Arc<Blocks>,
     reader: Reader,
-    /// The epoch that was the present one when this use began, or went on after a wait.
-    epoch: Cell<u64>,
-    pub known: Known,
+    /// What it has seen, and threads before it that have ended.
+    known: Known,
+    /// What lies across the borders of blocks, as long as it is looked at.
+    pub scraps: Scraps,
     /// Uses inside of one another: the outermost one is in an epoch.
     depth: u32,
     /// Whether the thread has a place at the gate, which it keeps until it ends.
@@ -38,8 +40,8 @@ impl Local {
             _ => Box::new(Self {
                 blocks: Arc::clone(blocks),
                 reader: blocks.epochs.reader().expect("fewer than 4096 threads use a scene"),
-                epoch: Cell::new(0),
-                known: Known::new(),
+                known: blocks.knowledge(),
+                scraps: Scraps::default(),
                 depth: 0,
                 at_gate: false,
                 stalled: Cell::new(Duration::ZERO),
@@ -88,13 +90,18 @@ impl Local {
         self.depth -= 1;
         if self.depth == 0 {
             self.reader.leave();
+            let uses = self.known.take_uses();
+            if uses > 0 {
+                self.blocks.words.add_uses(uses);
+            }
         }
     }
 
     /// Goes on with a use that was [left](Self::leave).
     #[inline(always)]
     pub fn enter(&self) {
-        self.epoch.set(self.reader.enter());
+        let epoch = self.reader.enter();
+        self.known.begin(epoch, self.blocks.tick());
     }
 
     /// Leaves the epoch in the middle of a use, to wait for something.
@@ -102,10 +109,10 @@ impl Local {
         self.reader.leave();
     }
 
-    /// The epoch that was the present one when this use began, or went on.
+    /// The lists that were seen whole when this use began, or went on.
     #[inline(always)]
-    pub fn epoch(&self) -> u64 {
-        self.epoch.get()
+    pub fn known(&self) -> &Known {
+        &self.known
     }
 
     /// Lets another thread go on while this one waits.
@@ -137,5 +144,6 @@ impl Local {
 impl Drop for Local {
     fn drop(&mut self) {
         self.step_aside();
+        self.blocks.pass_on(std::mem::take(&mut self.known));
     }
 }

@@ -22,18 +22,19 @@
 //! | file | what |
 //! |---|---|
 //! | `layout` | which byte of which array is in which block |
-//! | `arena` | addresses for all blocks, memory for those that are here |
+//! | `slots` | memory for blocks that are here, and which of it is whose |
 //! | `words` | a word for each block: here? used when, how often? |
-//! | `epoch` | who still reads, so that memory is not freed under him |
+//! | `epoch`, `retired` | who still reads, so that memory is not freed under him, and what waits for that |
 //! | `directory`, `policy/` | sets of blocks behind striped locks, and which block makes room |
 //! | `deadline` | when threads stop waiting |
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
 //! | `requests`, `loaders` | what loaders are asked for: first what is needed, then what may be needed soon |
 //! | `ahead`, `beside`, `glance` | blocks that come before they are needed, and which ones that may be |
 //! | `blocks` | all of these at work: asking, loading, giving up |
-//! | `local`, `known`, `view` | a thread's state, what it has seen, and the tree as it sees it |
+//! | `local`, `known`, `scraps` | a thread's state, what it has seen, what it has put together |
+//! | `part`, `view` | an array and the tree as a thread sees them |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
-//! | `source`, `file`, `at_once` | where blocks come from |
+//! | `source`, `pieces`, `file`, `at_once` | where blocks come from |
 //!
 //! **Waiting is a thread's.** More threads than processors take part; one that waits for a block keeps its
 //! tile on its stack and lets another have its place. So the kernels need not be cut into pieces that can be
@@ -43,7 +44,6 @@
 //! threads that need it and becomes an error of the frame: [`Cached::or_error`].
 
 mod ahead;
-mod arena;
 mod at_once;
 mod beside;
 mod blocks;
@@ -57,10 +57,15 @@ mod known;
 mod layout;
 mod loaders;
 mod local;
+mod part;
+mod pieces;
 mod plan;
 pub mod policy;
 mod quota;
 mod requests;
+mod retired;
+mod scraps;
+mod slots;
 mod source;
 mod stats;
 mod sync;
@@ -82,6 +87,7 @@ use known::Known;
 use layout::Layout;
 use loaders::Loaders;
 use local::Local;
+use scraps::Scraps;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -145,17 +151,27 @@ impl Cached {
     ) -> Result<Self> {
         options.check()?;
         let layout = Layout::new(resident.bytes, options.block);
-        let size = SPREAD_BLOCKS.iter().position(|&block| block == options.block);
-        let most = resident.spread[size.expect("it was checked")].clamp(2, layout.blocks().max(2));
+        let most = most_blocks(&resident.spread, options.block).clamp(2, layout.blocks().max(2));
         let workers = options.loading.workers(threads);
-        let own = workers * Known::bytes();
-        let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + own + beside;
-        let blocks = memory.saturating_sub(overhead) / options.block;
+        let reading = pieces::most_bytes(options.block);
+        let own = |memory| {
+            let holders = Plan::holders(workers);
+            let each = Known::bytes(Known::lines(memory, holders)) + Scraps::BYTES + reading;
+            holders * each + options.loading.loaders() * reading
+        };
+        let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
+        let each = options.block + Blocks::OVERHEAD_HERE;
+        let blocks = memory.saturating_sub(overhead + own(memory)) / each;
         // More than would ever be used is left to the system.
         let blocks = blocks.min(2 * layout.blocks() + Plan::least(options, most));
         let plan = Plan::new(options, blocks, most, workers);
         let Some(plan) = plan else {
-            let least = overhead + Plan::least(options, most) * options.block;
+            let needed = |memory| overhead + own(memory) + Plan::least(options, most) * each;
+            // With more memory, threads have a little more of their own: a hundredth of it.
+            let mut least = needed(0);
+            while needed(least) > least {
+                least = needed(least);
+            }
             let message = format!(
                 "{} is too little for this scene: it takes at least {} with blocks of {} KiB",
                 mebibytes(memory),
@@ -316,10 +332,11 @@ impl Cached {
 
     /// From now on, takes note of uses, or no longer does.
     pub fn trace_uses(&self, on: bool) {
-        self.blocks.words.trace(on);
+        self.blocks.trace_uses(on);
     }
 
-    /// The blocks that were used since the last call, each once a tile, in about the order of use.
+    /// The blocks that were used since the last call, each once a tile, in about the order of use; where all of them
+    /// can be in memory, each once.
     pub fn take_uses(&self) -> Vec<u32> {
         self.blocks.words.take_trace()
     }
@@ -351,6 +368,15 @@ impl Drop for Session<'_> {
         let mut local = Local::take(&self.cached.blocks);
         local.end();
         local.put();
+    }
+}
+
+/// The most blocks that a page or a leaf takes.
+fn most_blocks(spread: &[usize; SPREAD_BLOCKS.len()], block: usize) -> usize {
+    match SPREAD_BLOCKS.iter().position(|&size| size == block) {
+        Some(size) => spread[size],
+        // Each of the smallest that were counted is so many.
+        None => spread[0] * SPREAD_BLOCKS[0].div_ceil(block),
     }
 }
 

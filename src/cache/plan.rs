@@ -1,6 +1,7 @@
 //! How the memory for blocks is divided.
 
 use super::directory::Shape;
+use super::known::Known;
 use super::policy::Replacement;
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -9,7 +10,7 @@ use std::str::FromStr;
 /// What can be chosen about a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CacheOptions {
-    /// Bytes of a block: a power of two from 4 to 64 KiB, and at least a page of the system.
+    /// Bytes of a block: a power of two from 512 to 65,536.
     pub block: usize,
     /// Blocks that a set holds.
     pub ways: usize,
@@ -139,7 +140,7 @@ impl CacheOptions {
         if !self.block.is_power_of_two() || !super::layout::BLOCK_BYTES.contains(&self.block) {
             return wrong(
                 "--block",
-                format!("{} is not a power of two from 4096 (4 KiB) to 65536 (64 KiB)", self.block),
+                format!("{} is not a power of two from 512 to 65536 (64 KiB)", self.block),
             );
         }
         if !(1..=1024).contains(&self.ways) {
@@ -173,6 +174,8 @@ pub struct Plan {
     pub ahead: usize,
     /// All that may have memory, with those that have been given up and are still read.
     pub all: usize,
+    /// Lines of lists that are known, which each thread keeps beside its tree (`cache/known.rs`).
+    pub lines: usize,
 }
 
 /// Of so many blocks that a cache holds, one may have come ahead of need: few enough that guesses which are wrong
@@ -197,13 +200,19 @@ impl Plan {
                 [Some(shape(options, policy, nodes)), Some(shape(options, options.policy, held - nodes))]
             }
         };
-        let mut plan = Self { shapes, pinned, ahead: 0, all: blocks };
+        let lines = Known::lines(blocks * options.block, Self::holders(workers));
+        let mut plan = Self { shapes, pinned, ahead: 0, all: blocks, lines };
         if options.prefetch == Prefetch::Ahead && options.loading.loaders() > 0 {
             // All of them may be nodes, or leaves. One is being read while another is here.
             let least = plan.shapes.iter().flatten().map(Shape::blocks).min().unwrap_or(0);
             plan.ahead = Some(least / AHEAD).filter(|&ahead| ahead >= 2).unwrap_or(0);
         }
         Some(plan)
+    }
+
+    /// How many may keep lists in mind where so many walk: each of them may look at a surface meanwhile.
+    pub const fn holders(workers: usize) -> usize {
+        2 * workers
     }
 
     /// Blocks that sets hold.

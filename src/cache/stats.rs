@@ -7,7 +7,8 @@ use std::time::Duration;
 /// Counts of a cache's work, since it was opened or they were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CacheStats {
-    /// Uses of blocks: a tile that needs a block again and again uses it once.
+    /// Uses of blocks: a tile that needs a block again and again uses it once. Neighbouring lists of
+    /// triangles that are known to be here with all their blocks count as one.
     pub uses: u64,
     /// Blocks that were waited for.
     pub misses: u64,

@@ -86,7 +86,7 @@ fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
                     let found = || {
                         wanted.iter().all(|&block| {
                             // SAFETY: it was here when the epoch was entered, which goes on.
-                            let words = unsafe { blocks.arena.fill(block as usize * BLOCK, BLOCK) };
+                            let words: &[u8; BLOCK] = unsafe { &*blocks.slots.at(block as usize).cast() };
                             words.as_chunks::<4>().0.iter().all(|word| *word == (block + 1).to_le_bytes())
                         })
                     };

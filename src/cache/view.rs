@@ -1,14 +1,16 @@
 //! The tree as one thread sees it, for the length of one query.
 
 use super::Cached;
-use super::blocks::Blocks;
-use super::layout::{Array, Column};
+use super::layout::Array;
 use super::local::Local;
+use super::part::Part;
+use super::slots::Slots;
 use super::words::Words;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::{Node, Scale, Tree};
 use crate::simd::prefetch;
+use std::cell::Cell;
 use std::ops::Range;
 use std::panic;
 use std::time::{Duration, Instant};
@@ -21,38 +23,21 @@ use std::time::{Duration, Instant};
 pub struct View<'a> {
     cached: &'a Cached,
     words: &'a Words,
+    slots: &'a Slots,
     nodes: Part<Node>,
     references: Part<u32>,
     pages: Part<u32>,
     triangles: Part<Triangle>,
+    /// Of these, shading asks for a few bytes at a time.
+    colors: Part<u8>,
+    surfaces: Part<u8>,
+    /// The inner node that was entered last, and where its children are.
+    inner: Cell<(Node, *const [Node; 2])>,
+    /// Whether all blocks lie in memory as they do in their arrays: see [`Slots`].
+    in_order: Cell<bool>,
     shift: u32,
     tick: u32,
     local: Option<Box<Local>>,
-}
-
-/// An array, found with few loads.
-#[derive(Clone, Copy, Debug)]
-struct Part<T> {
-    first: *const T,
-    count: usize,
-    /// Its first byte in the arena.
-    base: usize,
-}
-
-impl<T> Part<T> {
-    #[inline(always)]
-    fn new(blocks: &Blocks, array: Array) -> Self {
-        let Column { base, bytes } = blocks.layout.column(array);
-        Self { first: blocks.arena.at(base).cast(), count: bytes / size_of::<T>(), base }
-    }
-
-    /// The blocks that hold some elements.
-    #[inline(always)]
-    fn blocks(&self, elements: Range<usize>, shift: u32) -> Range<usize> {
-        let first = self.base + elements.start * size_of::<T>();
-        let end = self.base + elements.end * size_of::<T>();
-        first >> shift..((end - 1) >> shift) + 1
-    }
 }
 
 /// What unwinds through the kernels when a block cannot be read.
@@ -69,10 +54,16 @@ impl<'a> View<'a> {
         Self {
             cached,
             words: &blocks.words,
+            slots: &blocks.slots,
             nodes: Part::new(blocks, Array::Nodes),
             references: Part::new(blocks, Array::References),
             pages: Part::new(blocks, Array::Pages),
             triangles: Part::new(blocks, Array::Triangles),
+            colors: Part::new(blocks, Array::Colors),
+            surfaces: Part::new(blocks, Array::Surfaces),
+            inner: Cell::new((Node::leaf(0, 0), blocks.slots.nowhere().cast())),
+            // In its epoch by now.
+            in_order: Cell::new(blocks.slots.are_in_order()),
             shift: blocks.layout.shift(),
             tick: blocks.tick(),
             local: Some(local),
@@ -93,30 +84,124 @@ impl<'a> View<'a> {
         here
     }
 
+    /// Where a byte lies whose block is here.
+    #[inline(always)]
+    fn at(&self, byte: usize) -> *const u8 {
+        let into = byte & ((1 << self.shift) - 1);
+        self.slots.at(byte >> self.shift).wrapping_add(into)
+    }
+
+    /// Where bytes of an array lie, all together, whose blocks are here.
+    #[inline(always)]
+    fn find<T>(&self, part: &Part<T>, bytes: Range<usize>) -> *const u8 {
+        let block = bytes.start >> self.shift;
+        if block != (bytes.end - 1) >> self.shift {
+            return self.put_together(bytes);
+        }
+        part.keep(block << self.shift, self.slots.at(block));
+        part.origin.get().wrapping_add(bytes.start - part.base)
+    }
+
+    /// A copy of bytes of several blocks.
+    #[cold]
+    #[inline(never)]
+    fn put_together(&self, bytes: Range<usize>) -> *const u8 {
+        let whole = self.local().scraps.room(bytes.len());
+        self.copy(bytes, whole);
+        whole
+    }
+
+    /// Copies bytes of any blocks that are here to where there is room for them.
+    fn copy(&self, mut bytes: Range<usize>, mut to: *mut u8) {
+        while !bytes.is_empty() {
+            let count = ((1 << self.shift) - (bytes.start & ((1 << self.shift) - 1))).min(bytes.len());
+            // SAFETY: these lie in one block, and every block has memory; there is room for all of them.
+            unsafe { to.copy_from_nonoverlapping(self.at(bytes.start), count) };
+            to = to.wrapping_add(count);
+            bytes.start += count;
+        }
+    }
+
     /// Some elements of an array, whose blocks have been entered.
     #[inline(always)]
     fn slice<T>(&self, part: &Part<T>, elements: Range<usize>) -> &[T] {
-        assert!(elements.start <= elements.end && elements.end <= part.count);
-        // SAFETY: the elements are inside of the array, which begins at the start of a block and so is
-        // aligned. They were here when their blocks were entered, this thread is still in that epoch, and
-        // nobody writes to a block that is here. All of `T`'s values are plain numbers.
-        unsafe { std::slice::from_raw_parts(part.first.wrapping_add(elements.start), elements.len()) }
+        if elements.is_empty() {
+            return &[];
+        }
+        let count = elements.len();
+        let bytes = part.bytes(elements);
+        let into = bytes.start.wrapping_sub(part.last.get());
+        let is_in_last = into < 1 << self.shift && bytes.len() <= (1 << self.shift) - into;
+        let first = if self.in_order.get() | is_in_last {
+            part.origin.get().wrapping_add(bytes.start - part.base)
+        } else {
+            self.find(part, bytes)
+        };
+        // SAFETY: so many elements lie there, aligned, as every array begins at the start of a block. They were here
+        // when their blocks were entered, this thread is still in that epoch, and nobody writes to a block that is
+        // here; or they are this thread's own copy. All of `T`'s values are plain numbers.
+        unsafe { std::slice::from_raw_parts(first.cast(), count) }
     }
 
-    /// Has some elements of an array here.
+    /// So many elements of an array, likewise.
     #[inline(always)]
-    fn enter_elements<T>(&self, part: &Part<T>, elements: Range<usize>) {
-        let blocks = part.blocks(elements, self.shift);
-        if !self.use_all(blocks.clone()) {
-            self.gather_range(blocks);
+    fn array<T, const N: usize>(&self, part: &Part<T>, first: usize) -> &[T; N] {
+        let place = if self.in_order.get() {
+            let bytes = part.bytes(first..first + N);
+            part.origin.get().wrapping_add(bytes.start - part.base).cast()
+        } else {
+            match part.in_last(first, self.shift) {
+                Some(place) => place,
+                None => self.find(part, part.bytes(first..first + N)).cast(),
+            }
+        };
+        // SAFETY: as in `slice`.
+        unsafe { &*place }
+    }
+
+    /// Has some elements of an array here, and says where they are.
+    ///
+    /// Calls are out of the way and said to be rare, so that a kernel keeps its vectors in registers past them: with
+    /// one in the midst of a walk, packets took an eighth longer.
+    #[inline(always)]
+    fn enter_elements<T, const N: usize>(&self, part: &Part<T>, first: usize) -> *const [T; N] {
+        // No closures: they would be functions of their own, without the kernel's instruction set.
+        if let Some(place) = part.in_last(first, self.shift) {
+            return place;
+        }
+        let blocks = part.blocks(first..first + N, self.shift);
+        let last = blocks.end - 1;
+        let is_one = blocks.start == last;
+        if !is_one || !self.words.was_used_in(last, self.tick) {
+            self.enter_blocks(blocks);
+        }
+        if self.in_order.get() {
+            // Their place hangs on nothing: it is not waited for.
+            part.last.set(last << self.shift);
+            return part.origin.get().wrapping_add(first * size_of::<T>()).cast();
+        }
+        part.keep(last << self.shift, self.slots.at(last));
+        if is_one {
+            part.origin.get().wrapping_add(first * size_of::<T>()).cast()
+        } else {
+            self.put_together(part.bytes(first..first + N)).cast()
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn gather_range(&self, blocks: Range<usize>) {
-        let blocks: Vec<u32> = blocks.map(|block| block as u32).collect();
-        self.gather(&blocks);
+    fn enter_blocks(&self, blocks: Range<usize>) {
+        if !self.use_all(blocks.clone()) {
+            let blocks: Vec<u32> = blocks.map(|block| block as u32).collect();
+            self.gather(&blocks);
+        }
+    }
+
+    /// Takes back what was put together.
+    #[inline(always)]
+    fn forget_copies(&self) {
+        // SAFETY: what a view has given out is looked at until something is entered, and no longer.
+        unsafe { self.local().scraps.clear() };
     }
 
     /// Has a list of primitives here, and their triangles.
@@ -125,15 +210,17 @@ impl<'a> View<'a> {
         if list.is_empty() {
             return;
         }
-        let (local, name) = (self.local(), part.base + list.start * size_of::<u32>());
-        if !local.known.has(name, local.epoch(), self.tick) {
+        self.forget_copies();
+        let (known, name) = (self.local().known(), part.base / size_of::<u32>() + list.start);
+        if !known.has(name, self.tick) {
             self.look_at_list(part, list);
-            // By now it is whole, and the epoch may be another.
-            local.known.add(name, local.epoch(), self.tick);
+            // By now it is whole, and the era may be another.
+            known.add(name, self.tick);
         }
     }
 
     /// The same, word by word.
+    #[cold]
     #[inline(never)]
     fn look_at_list(&self, part: &Part<u32>, list: Range<usize>) {
         let mut here = self.use_all(part.blocks(list.clone(), self.shift));
@@ -142,8 +229,8 @@ impl<'a> View<'a> {
             for &primitive in self.slice(part, list.clone()) {
                 let primitive = primitive as usize;
                 // The kernel reads it next: 2 to 3 % of a frame's time.
-                prefetch(self.triangles.first.wrapping_add(primitive));
                 let blocks = self.triangles.blocks(primitive..primitive + 1, self.shift);
+                prefetch(self.at(self.triangles.base + primitive * size_of::<Triangle>()));
                 // Triangles that follow one another lie mostly in one block.
                 if blocks != last {
                     here &= self.use_all(blocks.clone());
@@ -179,6 +266,14 @@ impl<'a> View<'a> {
     fn gather(&self, wanted: &[u32]) {
         let (blocks, local) = (&self.cached.blocks, self.local());
         let start = Instant::now();
+        // From here on, what was here may go. Of lists, `known` knows.
+        self.inner.set((Node::leaf(0, 0), self.slots.nowhere().cast()));
+        self.nodes.forget();
+        self.references.forget();
+        self.pages.forget();
+        self.triangles.forget();
+        self.colors.forget();
+        self.surfaces.forget();
         local.leave();
         let mut is_aside = false;
         let gathered = blocks.gather(&self.cached.loaders, wanted, || {
@@ -190,6 +285,7 @@ impl<'a> View<'a> {
         }
         // Before they are let go of, so that the epoch protects them from then on.
         local.enter();
+        self.in_order.set(self.in_order.get() && self.slots.are_in_order());
         local.stalled(start.elapsed());
         match gathered {
             Ok(gathered) => drop(gathered),
@@ -237,12 +333,18 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Some bytes of an array, entered and copied. Panics if they are out of range.
+    /// Some bytes of the colours or the surfaces, entered and copied. Panics if they are out of range, or of another
+    /// array.
+    #[inline(always)]
     pub fn bytes<const N: usize>(&self, array: Array, first: usize) -> [u8; N] {
-        let part: Part<u8> = Part::new(&self.cached.blocks, array);
+        let part = match array {
+            Array::Colors => &self.colors,
+            Array::Surfaces => &self.surfaces,
+            other => unreachable!("{} are no bytes", other.name()),
+        };
         assert!(first + N <= part.count, "{} has {} bytes", array.name(), part.count);
-        self.enter_elements(&part, first..first + N);
-        *self.slice(&part, first..first + N).first_chunk().expect("as many as asked for")
+        // SAFETY: as in `slice`.
+        unsafe { *self.enter_elements(part, first) }
     }
 
     /// All that this thread has waited so far.
@@ -279,9 +381,13 @@ impl Tree for View<'_> {
 
     #[inline(always)]
     fn children(&self, inner: Node) -> [Node; 2] {
-        let below = inner.below() as usize;
-        let pair = self.slice(&self.nodes, below..below + 2);
-        [pair[0], pair[1]]
+        let (entered, children) = self.inner.get();
+        if entered == inner {
+            // SAFETY: as in `slice`: it was entered, and nothing else since.
+            unsafe { *children }
+        } else {
+            *self.array(&self.nodes, inner.below() as usize)
+        }
     }
 
     #[inline(always)]
@@ -297,8 +403,9 @@ impl Tree for View<'_> {
     #[inline(always)]
     fn beneath(&self, place: usize) -> Node {
         let node = self.cached.beneath[place] as usize;
-        self.enter_elements(&self.nodes, node..node + 1);
-        self.slice(&self.nodes, node..node + 1)[0]
+        // SAFETY: as in `slice`.
+        let [node] = unsafe { *self.enter_elements::<_, 1>(&self.nodes, node) };
+        node
     }
 
     #[inline(always)]
@@ -308,8 +415,7 @@ impl Tree for View<'_> {
 
     #[inline(always)]
     fn triangle(&self, primitive: u32) -> &Triangle {
-        let primitive = primitive as usize;
-        &self.slice(&self.triangles, primitive..primitive + 1)[0]
+        &self.array::<_, 1>(&self.triangles, primitive as usize)[0]
     }
 
     #[inline(always)]
@@ -317,8 +423,8 @@ impl Tree for View<'_> {
         if node.is_leaf() {
             self.enter_list(&self.references, node.references());
         } else {
-            let below = node.below() as usize;
-            self.enter_elements(&self.nodes, below..below + 2);
+            let children = self.enter_elements(&self.nodes, node.below() as usize);
+            self.inner.set((node, children));
         }
     }
 
@@ -329,7 +435,7 @@ impl Tree for View<'_> {
 
     #[inline(always)]
     fn enter_triangle(&self, primitive: u32) {
-        let primitive = primitive as usize;
-        self.enter_elements(&self.triangles, primitive..primitive + 1);
+        self.forget_copies();
+        let _: *const [Triangle; 1] = self.enter_elements(&self.triangles, primitive as usize);
     }
 }

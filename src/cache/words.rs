@@ -22,6 +22,9 @@ const ONE: u32 = 1 << 24;
 const UNUSED: u32 = 1 << 23;
 const TICK: u32 = UNUSED - 1;
 
+/// Counters of uses.
+const COUNTERS: usize = 16;
+
 /// The words of all blocks.
 #[derive(Debug)]
 pub struct Words {
@@ -29,10 +32,18 @@ pub struct Words {
     /// First uses in a tick, while they are noted down.
     trace: Mutex<Vec<u32>>,
     tracing: AtomicBool,
-    /// First uses in a tick.
-    uses: CachePadded<AtomicU64>,
+    /// Whether that is all of them, and not only each block's first one since it came.
+    tracing_all: AtomicBool,
+    /// First uses in a tick, of every so-manieth block: threads that count at the same time do not wait for one another.
+    uses: [CachePadded<AtomicU64>; COUNTERS],
     /// Blocks that came ahead of need: those that were used afterwards, and those that went unused.
     ahead: CachePadded<[AtomicU64; 2]>,
+}
+
+/// Whether a word says that its block is here and was used in a tick.
+#[inline(always)]
+const fn was_used(word: u32, tick: u32) -> bool {
+    word & !COUNT == HERE | (tick & TICK)
 }
 
 impl Words {
@@ -43,7 +54,8 @@ impl Words {
             words,
             trace: Mutex::default(),
             tracing: AtomicBool::new(false),
-            uses: CachePadded::default(),
+            tracing_all: AtomicBool::new(false),
+            uses: Default::default(),
             ahead: CachePadded::default(),
         }
     }
@@ -61,7 +73,13 @@ impl Words {
         // What the loader wrote before it said that the block is here is seen from now on.
         let word = self.words[block].load(Ordering::Acquire);
         // Of a block that nobody has used, this says no in every tick.
-        word & !COUNT == HERE | (tick & TICK) || self.mark(block, word, tick)
+        was_used(word, tick) || self.mark(block, word, tick)
+    }
+
+    /// Whether a block is here that was used in a tick before: as [`use_in`](Self::use_in), without a first use.
+    #[inline(always)]
+    pub fn was_used_in(&self, block: usize, tick: u32) -> bool {
+        was_used(self.words[block].load(Ordering::Acquire), tick)
     }
 
     /// Takes note of the first use in a tick.
@@ -74,7 +92,7 @@ impl Words {
             match self.words[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
                 Ok(_) => {
                     self.count_ahead(word, 0);
-                    self.note(block);
+                    self.note(block, word & UNUSED != 0);
                     return true;
                 }
                 Err(now) => word = now,
@@ -83,9 +101,9 @@ impl Words {
         false
     }
 
-    fn note(&self, block: usize) {
-        self.uses.fetch_add(1, Ordering::Relaxed);
-        if self.tracing.load(Ordering::Relaxed) {
+    fn note(&self, block: usize, is_first: bool) {
+        self.uses[block % COUNTERS].fetch_add(1, Ordering::Relaxed);
+        if self.is_tracing_all() || is_first && self.tracing.load(Ordering::Relaxed) {
             self.trace.lock().unwrap_or_else(PoisonError::into_inner).push(block as u32);
         }
     }
@@ -105,9 +123,19 @@ impl Words {
         }
     }
 
+    /// Counts first uses in a tick that were no use of any block: of lists that are known to be here.
+    pub fn add_uses(&self, uses: u64) {
+        self.uses[0].fetch_add(uses, Ordering::Relaxed);
+    }
+
+    /// Whether all first uses in a tick are being noted down.
+    fn is_tracing_all(&self) -> bool {
+        self.tracing_all.load(Ordering::Relaxed)
+    }
+
     /// First uses in a tick since the last call.
     pub fn take_uses(&self) -> u64 {
-        self.uses.swap(0, Ordering::Relaxed)
+        self.uses.iter().map(|uses| uses.swap(0, Ordering::Relaxed)).sum()
     }
 
     /// Blocks that came ahead of need since the last call: those that were used, and those that went unused.
@@ -115,9 +143,11 @@ impl Words {
         self.ahead.each_ref().map(|count| count.swap(0, Ordering::Relaxed))
     }
 
-    /// Notes first uses in a tick down from now on, or no longer does.
-    pub fn trace(&self, on: bool) {
+    /// Notes first uses in a tick down from now on, or no longer does; unless `all`, only each block's first one since
+    /// it came.
+    pub fn trace(&self, on: bool, all: bool) {
         self.tracing.store(on, Ordering::Relaxed);
+        self.tracing_all.store(on && all, Ordering::Relaxed);
     }
 
     /// What was noted down since the last call, in about the order of use.
@@ -145,7 +175,7 @@ impl Words {
     /// Says that a block is here, used once; all that was written to it before is seen by who sees that.
     pub fn arrive(&self, block: usize, tick: u32) -> Use {
         self.words[block].store(HERE | ONE | (tick & TICK), Ordering::Release);
-        self.note(block);
+        self.note(block, true);
         Use { tick: tick & TICK, count: 1 }
     }
 
@@ -198,15 +228,31 @@ mod tests {
         (0..300).for_each(|tick| assert!(words.use_in(1, tick)));
         assert_eq!(words.uses(1), Use { tick: 299, count: 127 });
         assert!(!words.is_here(0) && words.is_here(1));
-        words.trace(true);
+        words.trace(true, true);
         assert!(words.use_in(1, 300) && words.use_in(1, 300) && !words.use_in(0, 300));
         words.arrive(0, 301);
-        words.trace(false);
+        words.trace(false, false);
         assert!(words.use_in(1, 301));
         assert_eq!((words.take_trace(), words.take_trace()), (vec![1, 0], vec![]));
         words.leave(1);
         assert!(!words.use_in(1, 299));
         assert_eq!(words.uses(1), Use::default());
+    }
+
+    #[test]
+    fn first_uses_alone_are_written_down_where_that_will_do() {
+        let words = Words::new(2);
+        words.trace(true, false);
+        assert!(!words.is_tracing_all());
+        words.arrive(0, 1);
+        words.arrive_ahead(1, 1);
+        assert!((2..5).all(|tick| words.use_in(0, tick) && words.use_in(1, tick)));
+        assert_eq!((words.take_trace(), words.take_uses()), (vec![0, 1], 7));
+        words.trace(true, true);
+        assert!(words.is_tracing_all() && words.use_in(1, 5));
+        words.trace(false, true);
+        assert!(!words.is_tracing_all() && words.use_in(1, 6));
+        assert_eq!(words.take_trace(), [1]);
     }
 
     #[test]

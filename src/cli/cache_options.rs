@@ -32,7 +32,7 @@ pub struct CacheArgs {
 /// What caches are like, whatever their policy.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ShapeArgs {
-    /// Bytes of a block: 4096, 8192, 16384, 32768 or 65536
+    /// Bytes of a block: a power of two from 512 to 65536
     #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]
     block: usize,
     /// Blocks that a set holds: more of them keep what is used better and take longer to choose from

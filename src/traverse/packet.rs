@@ -89,10 +89,10 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
     loop {
         // Descend to a leaf, leaving farther children on the stack.
         while !node.is_leaf() {
+            tree.enter(node);
             let axis = node.axis();
             let wall = walk.crossing(axis, node.split());
             let parts = walk.cut(&interval, &wall);
-            tree.enter(node);
             let [below, above] = tree.children(node);
             let (first, second, [first_part, second_part]) = match walk.heading[axis] {
                 Heading::Up => (below, above, parts),

@@ -12,8 +12,6 @@
 
 #[path = "../../src/cache/ahead.rs"]
 mod ahead;
-#[path = "../../src/cache/arena.rs"]
-mod arena;
 #[path = "../../src/cache/beside.rs"]
 mod beside;
 #[path = "../../src/cache/blocks.rs"]
@@ -32,6 +30,8 @@ mod known;
 mod layout;
 #[path = "../../src/cache/loaders.rs"]
 mod loaders;
+#[path = "../../src/cache/pieces.rs"]
+mod pieces;
 #[path = "../../src/cache/plan.rs"]
 mod plan;
 #[path = "../../src/cache/policy/mod.rs"]
@@ -40,6 +40,10 @@ mod policy;
 mod quota;
 #[path = "../../src/cache/requests.rs"]
 mod requests;
+#[path = "../../src/cache/retired.rs"]
+mod retired;
+#[path = "../../src/cache/slots.rs"]
+mod slots;
 #[path = "../../src/cache/source.rs"]
 mod source;
 #[path = "../../src/cache/stats.rs"]

@@ -12,7 +12,7 @@ use crate::plan::{CacheOptions, Loading, Plan, Prefetch};
 use crate::policy::Replacement;
 use crate::quota::Quota;
 use crate::source::Source;
-use crate::sync::{Arc, AtomicBool, AtomicUsize, Ordering, thread};
+use crate::sync::{Arc, AtomicBool, AtomicUsize, Mutex, Ordering, thread};
 use std::io;
 use std::time::Instant;
 
@@ -81,7 +81,7 @@ fn cache_with(
     let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
     let shape = Shape { stripes: 1, sets: 1, ways, policy };
     let ahead = if prefetch == Prefetch::Ahead { AHEAD } else { 0 };
-    let plan = Plan { shapes: [Some(shape), None], pinned: PINNED, ahead, all: ways + PINNED };
+    let plan = Plan { shapes: [Some(shape), None], pinned: PINNED, ahead, all: ways + PINNED, lines: 128 };
     Blocks::new(layout, Box::new(Numbered { broken }), &options, &plan, 3).expect("it can begin")
 }
 
@@ -94,14 +94,20 @@ fn read(blocks: &Blocks, loaders: &Loaders, wanted: &[u32]) -> bool {
     if blocks.has_failed() {
         return false;
     }
+    // As kernels do, without a look at the table if there seems to be no need of it.
+    let in_order = blocks.slots.are_in_order();
+    let look = |block: usize| {
+        let place = if in_order { blocks.slots.home(block * BLOCK) } else { blocks.slots.at(block) };
+        // SAFETY: it was here when the epoch had been entered, which goes on.
+        let bytes: &[u8; BLOCK] = unsafe { &*place.cast() };
+        assert!(bytes.iter().all(|&byte| byte == number(block)), "block {block} is another's");
+    };
     for _ in 0..2 {
-        for &block in wanted {
-            // SAFETY: it was here when the epoch was entered, which goes on.
-            let bytes = unsafe { blocks.arena.fill(block as usize * BLOCK, BLOCK) };
-            assert!(bytes.iter().all(|&byte| byte == number(block as usize)), "block {block} is another's");
-        }
+        wanted.iter().for_each(|&block| look(block as usize));
         thread::yield_now();
     }
+    // What others have brought meanwhile is good, too.
+    (0..BLOCKS).filter(|&block| blocks.words.is_here(block)).for_each(look);
     true
 }
 
@@ -285,28 +291,37 @@ pub fn known_lists_hold() {
     goes_while_it_is_read(true);
 }
 
+/// What readers keep in mind.
+const LIST: usize = 1;
+
 /// Something that is there, declared gone, retired and freed, and two readers that may have found it; they may keep
-/// in mind what they saw.
+/// in mind what they saw, and then whoever reads next does.
 fn goes_while_it_is_read(keep_in_mind: bool) {
     let epochs = Epochs::new(4);
     let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
+    let all_known = Arc::new(Mutex::new(vec![Known::new(128), Known::new(128)]));
     let readers: Vec<_> = (0..2)
         .map(|_| {
-            let (reader, here, freed) =
-                (epochs.reader().expect("room"), Arc::clone(&here), Arc::clone(&freed));
+            let (reader, all_known, here, freed) = (
+                epochs.reader().expect("room"),
+                Arc::clone(&all_known),
+                Arc::clone(&here),
+                Arc::clone(&freed),
+            );
             thread::spawn(move || {
-                let known = Known::new();
                 for _ in 0..2 + usize::from(keep_in_mind) {
-                    let epoch = reader.enter();
-                    if known.has(1, epoch, 0) || here.load(Ordering::SeqCst) {
+                    let known = all_known.lock().expect("no panic").pop().expect("one for each reader");
+                    known.begin(reader.enter(), 0);
+                    if known.has(LIST, 0) || here.load(Ordering::SeqCst) {
                         if keep_in_mind {
-                            known.add(1, epoch, 0);
+                            known.add(LIST, 0);
                         }
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
                         thread::yield_now();
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
                     }
                     reader.leave();
+                    all_known.lock().expect("no panic").push(known);
                 }
             })
         })

@@ -27,7 +27,8 @@
 //! about a hit.
 
 use super::beam::{Beam, Frame, Spread};
-use crate::geometry::triangle::{Placed, Row, Triangle, side};
+use crate::geometry::triangle::{Placed, Row, side};
+use crate::kdtree::Tree;
 use crate::simd::{Lanes, Sixteen};
 
 /// By how much outlines are widened, relative to the farthest corner.
@@ -201,13 +202,12 @@ impl Block {
         }
     }
 
-    /// Puts triangles into the first lanes; the lanes beyond the last repeat the first one. `triangle` gives the
-    /// one with an id.
+    /// Puts triangles of a tree into the first lanes; the lanes beyond the last repeat the first one.
     #[inline(always)]
-    pub fn fill<'t, L: Sixteen>(&mut self, primitives: &[u32], triangle: impl Fn(u32) -> &'t Triangle) {
-        let mut triangles = [triangle(primitives[0]); 16];
+    pub fn fill<L: Sixteen, T: Tree>(&mut self, primitives: &[u32], tree: &T) {
+        let mut triangles = [tree.triangle(primitives[0]); 16];
         for (lane, id) in primitives.iter().enumerate().take(16) {
-            triangles[lane] = triangle(*id);
+            triangles[lane] = tree.triangle(*id);
         }
         for four in 0..3 {
             let mut fours = [&[0.0; 4]; 16];

@@ -158,8 +158,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
             self.work += BLOCK_WORK;
 
             // Cull for the beam.
-            let tree = self.tree;
-            self.block.fill::<L>(primitives, |primitive| tree.triangle(primitive));
+            self.block.fill::<L, _>(primitives, self.tree);
             let outline = self.block.outline(self.beam);
             let present = (1 << primitives.len()) - 1;
             let left = outline.meets(&all).bits() & present;
