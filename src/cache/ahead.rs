@@ -180,7 +180,7 @@ mod tests {
         fn new(ahead: usize) -> Self {
             let options = CacheOptions { loading: Loading::Synchronous, ..CacheOptions::default() };
             let layout = Layout::new([0, 0, 0, 20 * BLOCK, 0, 0], BLOCK);
-            let plan = Plan::new(&options, 60, 2, 1).expect("enough");
+            let plan = Plan::new(&options, 60, 2, 1, 1).expect("enough");
             let ((tell, begins), (works, word)) = (channel(), channel());
             let source = Told { begins: Mutex::new(tell), works: Mutex::new(word) };
             // One of these would be on its way.

@@ -106,7 +106,7 @@ mod tests {
     fn blocks() -> (Arc<Blocks>, Loaders, Reads) {
         let options = CacheOptions::default();
         let layout = Layout::new([0, 0, 0, 20 * BLOCK, 0, 0], BLOCK);
-        let plan = Plan::new(&options, 100, 2, 1).expect("enough");
+        let plan = Plan::new(&options, 100, 2, 1, 1).expect("enough");
         let reads = Reads::default();
         let source = Box::new(Noted(Arc::clone(&reads)));
         let (blocks, loaders) = Blocks::new(layout, source, &options, &plan, 1).expect("begins");

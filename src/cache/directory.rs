@@ -162,11 +162,15 @@ impl Directory {
 
     /// Has a set be within what it may hold, and counts what goes.
     fn make_room(&self, set: &mut Set, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
-        let counted = &mut |block| {
+        set.make_room(self.ways(set.ways.len() + set.coming), words, pins, &mut self.counting(gone));
+    }
+
+    /// Tells `gone` of blocks that go, and counts them.
+    fn counting(&self, gone: &mut dyn FnMut(u32)) -> impl FnMut(u32) {
+        |block| {
             self.held.fetch_sub(1, Ordering::Relaxed);
             gone(block);
-        };
-        set.make_room(self.ways(set.ways.len() + set.coming), words, pins, counted);
+        }
     }
 
     /// A block's stripe, locked, and its set's place there.
@@ -256,8 +260,7 @@ impl Directory {
         let (_, mut sets, at) = self.lock(block);
         if !pins.is_pinned(block) && words.leave_unused(block as usize) {
             sets.sets[at].ways.retain(|way| way.block != block);
-            self.held.fetch_sub(1, Ordering::Relaxed);
-            gone(block);
+            self.counting(gone)(block);
         }
     }
 
@@ -292,25 +295,22 @@ impl Directory {
 
     /// Declares blocks gone that sets hold beyond their ways, but for pinned ones, and tells `gone`.
     pub fn shrink(&self, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
-        let counted = &mut |block| {
-            self.held.fetch_sub(1, Ordering::Relaxed);
-            gone(block);
-        };
+        let mut gone = self.counting(gone);
         for stripe in &self.stripes {
             let mut sets = stripe.sets.lock().unwrap_or_else(PoisonError::into_inner);
-            sets.sets.iter_mut().for_each(|set| set.make_room(self.shape.ways, words, pins, counted));
+            sets.sets.iter_mut().for_each(|set| set.make_room(self.shape.ways, words, pins, &mut gone));
         }
     }
 
     /// Declares all blocks gone that are not pinned, and tells `gone`.
     pub fn clear(&self, words: &Words, pins: &Pins, gone: &mut dyn FnMut(u32)) {
+        let mut gone = self.counting(gone);
         for stripe in &self.stripes {
             let mut sets = stripe.sets.lock().unwrap_or_else(PoisonError::into_inner);
             for set in &mut sets.sets {
                 set.ways.retain(|way| {
                     let stays = pins.is_pinned(way.block);
                     if !stays {
-                        self.held.fetch_sub(1, Ordering::Relaxed);
                         words.leave(way.block as usize);
                         gone(way.block);
                     }

@@ -12,11 +12,11 @@
 //!
 //! **What policies know.** A list that is known is not marked as used again. Policies are asked only when something has
 //! to go, and from then on, in another epoch, every list is looked at anew: marks are at most as old as the last
-//! time that something went. So that what was seen a thousand frames before is not taken for what is in view, an *era*
+//! time that something went. So that what was seen long before is not taken for what is in view, an *era*
 //! ends in any case after [`TICKS`].
 //!
 //! **How it is kept.** A line of the cache for the lists that begin in 448 words after one another, which are those of
-//! some forty neighbouring leaves, or eight pages:
+//! some forty neighbouring leaves, or eight pages. Each has one line that it may have, or else the one beside it:
 //!
 //! ```text
 //!            63                     24 23       8 7         0
@@ -30,11 +30,15 @@
 use std::cell::Cell;
 use std::ops::Range;
 
-/// Lines that a thread has, as far as the memory allows. Each list has one line where it can be.
-const LINES: Range<usize> = 128..1 << 14;
+/// Lines that a thread has, as far as the memory allows.
+const LINES: Range<usize> = 128..1 << 16;
 
-/// Ticks in an era: 64 frames of 512 x 512.
-const TICKS: u32 = 1024;
+/// One in so many bytes of the memory for blocks is for lines. (With a hundredth, a thread of a flight of which all was in
+/// memory knew too few lists to go by, and looked at the rest at each visit.)
+const SHARE: usize = 32;
+
+/// Ticks in an era: 1024 frames of 512 x 512. (With 64 frames, looking at lists anew took 2 to 3 % of them.)
+const TICKS: u32 = 1 << 14;
 
 const TICK_BITS: u32 = 8;
 const ERA_BITS: u32 = 16;
@@ -69,11 +73,15 @@ impl Known {
         Self { lines: (0..lines).map(|_| Line::default()).collect(), ..Self::default() }
     }
 
-    /// How many lines a thread should have where so many of them share `memory` bytes of blocks: about a hundredth
-    /// goes into them.
+    /// How many lines a thread should have where so many of them share `memory` bytes of blocks.
     pub fn lines(memory: usize, threads: usize) -> usize {
-        let most = memory / 100 / threads.max(1) / size_of::<Line>();
+        let most = memory / SHARE / threads.max(1) / size_of::<Line>();
         (most.clamp(LINES.start, LINES.end) + 1).next_power_of_two() / 2
+    }
+
+    /// Whether nothing can be kept in mind: there are no lines.
+    pub const fn is_none(&self) -> bool {
+        self.lines.is_empty()
     }
 
     /// Memory of one.
@@ -104,39 +112,53 @@ impl Known {
     /// Whether a list was seen whole in this era: the one that begins at this of all arrays' words.
     #[inline(always)]
     pub fn has(&self, list: usize, tick: u32) -> bool {
-        let (line, now, bit) = self.find(list, tick);
-        let (seen, word) = (line.tag.get(), line.begin[bit / 64].get());
-        let has = (seen ^ now) >> TICK_BITS == 0 && word >> (bit % 64) & 1 != 0;
-        if has && seen != now {
-            line.tag.set(now);
-            self.uses.set(self.uses.get() + 1);
+        let (place, now, bit) = self.find(list, tick);
+        for place in [place, place ^ 1] {
+            let Some(line) = self.lines.get(place) else { return false };
+            let seen = line.tag.get();
+            if (seen ^ now) >> TICK_BITS == 0 {
+                let has = line.begin[bit / 64].get() >> (bit % 64) & 1 != 0;
+                if has && seen != now {
+                    line.tag.set(now);
+                    self.uses.set(self.uses.get() + 1);
+                }
+                return has;
+            }
         }
-        has
+        false
     }
 
     /// Keeps in mind that it was.
-    #[inline(always)]
     pub fn add(&self, list: usize, tick: u32) {
-        let (line, now, bit) = self.find(list, tick);
-        if (line.tag.get() ^ now) >> TICK_BITS != 0 {
-            // Others were here, or it was another era.
+        let (place, now, bit) = self.find(list, tick);
+        let (Some(first), Some(other)) = (self.lines.get(place), self.lines.get(place ^ 1)) else { return };
+        let is_its = |line: &&Line| (line.tag.get() ^ now) >> TICK_BITS == 0;
+        let line = [first, other].into_iter().find(is_its).unwrap_or_else(|| {
+            // Others are there. Those of another era are nothing; of two, those that were seen longer ago go.
+            let age = |line: &Line| {
+                let (seen, era) = (line.tag.get(), (1 << ERA_BITS) - 1);
+                let is_past = (seen ^ now) >> TICK_BITS & era != 0;
+                if is_past { u64::MAX } else { now.wrapping_sub(seen) & ((1 << TICK_BITS) - 1) }
+            };
+            let line = if age(other) > age(first) { other } else { first };
             line.begin.iter().for_each(|word| word.set(0));
-        }
+            line
+        });
         line.tag.set(now);
         let word = &line.begin[bit / 64];
         word.set(word.get() | 1 << (bit % 64));
     }
 
-    /// A list's line, the tag that it has if the list was seen now, and the list's bit.
+    /// A list's place among the lines, the tag that its line has if the list was seen now, and the list's bit.
     #[inline(always)]
-    fn find(&self, list: usize, tick: u32) -> (&Line, u64, usize) {
-        let (place, bit) = (list / WORDS, list % WORDS);
+    fn find(&self, list: usize, tick: u32) -> (usize, u64, usize) {
+        let (range, bit) = (list / WORDS, list % WORDS);
         // An array of a hundred terabytes is not in sight.
-        debug_assert!((place as u64) >> (u64::BITS - ERA_BITS - TICK_BITS) == 0);
+        debug_assert!((range as u64) >> (u64::BITS - ERA_BITS - TICK_BITS) == 0);
         // Of two ticks that are taken for one, a use is not counted.
         let tick = u64::from(tick) & ((1 << TICK_BITS) - 1);
-        let tag = ((place as u64) << ERA_BITS | self.era.get()) << TICK_BITS | tick;
-        (&self.lines[place & (self.lines.len() - 1)], tag, bit)
+        let tag = ((range as u64) << ERA_BITS | self.era.get()) << TICK_BITS | tick;
+        (range & self.lines.len().wrapping_sub(1), tag, bit)
     }
 
     /// First uses in a tick of lists that were known, since the last call.
@@ -215,14 +237,39 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_a_power_of_two_within_a_hundredth() {
+    fn what_was_seen_longer_ago_makes_room() {
+        let known = known();
+        let lists = [0, 128, 256].map(|range| range * WORDS);
+        known.add(lists[0], 1);
+        known.add(lists[1], 2);
+        assert!(known.has(lists[0], 3) && known.has(lists[1], 2), "one of them beside its line");
+        known.add(lists[2], 4);
+        assert_eq!(lists.map(|list| known.has(list, 4)), [true, false, true]);
+        known.begin(1, 4);
+        known.add(lists[1], 4);
+        assert_eq!(lists.map(|list| known.has(list, 4)), [false, true, false]);
+        known.add(lists[0], 4);
+        assert!(known.has(lists[0], 4) && known.has(lists[1], 4), "what is of the past has no age");
+    }
+
+    #[test]
+    fn who_has_no_lines_knows_nothing() {
+        let known = Known::default();
+        assert!(known.is_none());
+        known.begin(0, 0);
+        known.add(40, 0);
+        assert!(!known.has(40, 0) && !known.has(0, 0));
+    }
+
+    #[test]
+    fn lines_are_a_power_of_two_within_their_share() {
         for (memory, threads, lines) in [
             (0, 1, 128),
-            (1 << 20, 2, 128),
-            (48 << 20, 16, 1 << 8),
-            (48 << 20, 2, 1 << 11),
-            (500_000_000, 2, 1 << 14),
-            (1 << 40, 1, 1 << 14),
+            (1 << 20, 2, 256),
+            (48 << 20, 16, 1 << 10),
+            (48 << 20, 2, 1 << 13),
+            (500_000_000, 2, 1 << 16),
+            (1 << 40, 1, 1 << 16),
         ] {
             assert_eq!(Known::lines(memory, threads), lines, "{memory} bytes, {threads} threads");
         }

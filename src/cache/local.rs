@@ -14,7 +14,7 @@ use std::time::Duration;
 pub struct Local {
     blocks: Arc<Blocks>,
     reader: Reader,
-    /// What it has seen, and threads before it that have ended.
+    /// What it has seen, and threads before it that have ended; nothing before its first square.
     known: Known,
     /// What lies across the borders of blocks, as long as it is looked at.
     pub scraps: Scraps,
@@ -40,7 +40,7 @@ impl Local {
             _ => Box::new(Self {
                 blocks: Arc::clone(blocks),
                 reader: blocks.epochs.reader().expect("fewer than 4096 threads use a scene"),
-                known: blocks.knowledge(),
+                known: Known::default(),
                 scraps: Scraps::default(),
                 depth: 0,
                 at_gate: false,
@@ -80,6 +80,9 @@ impl Local {
                 gate.begin();
                 self.at_gate = true;
             }
+        }
+        if self.depth == 0 && self.known.is_none() {
+            self.known = self.blocks.knowledge();
         }
         self.begin();
     }

@@ -155,28 +155,28 @@ impl Cached {
         let workers = options.loading.workers(threads);
         let reading = pieces::most_bytes(options.block);
         let own = |memory| {
-            let holders = Plan::holders(workers);
-            let each = Known::bytes(Known::lines(memory, holders)) + Scraps::BYTES + reading;
-            holders * each + options.loading.loaders() * reading
+            let knowing = threads * Known::bytes(Known::lines(memory, threads));
+            // A thread that walks may look at a surface meanwhile.
+            knowing + 2 * workers * (Scraps::BYTES + reading) + options.loading.loaders() * reading
         };
         let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
         let each = options.block + Blocks::OVERHEAD_HERE;
         let blocks = memory.saturating_sub(overhead + own(memory)) / each;
         // More than would ever be used is left to the system.
         let blocks = blocks.min(2 * layout.blocks() + Plan::least(options, most));
-        let plan = Plan::new(options, blocks, most, workers);
+        let plan = Plan::new(options, blocks, most, workers, threads);
         let Some(plan) = plan else {
             let needed = |memory| overhead + own(memory) + Plan::least(options, most) * each;
-            // With more memory, threads have a little more of their own: a hundredth of it.
+            // With more memory, threads have a little more of their own.
             let mut least = needed(0);
             while needed(least) > least {
                 least = needed(least);
             }
             let message = format!(
-                "{} is too little for this scene: it takes at least {} with blocks of {} KiB",
+                "{} is too little for this scene: it takes at least {} with blocks of {} bytes",
                 mebibytes(memory),
                 mebibytes(least),
-                options.block >> 10,
+                options.block,
             );
             return Err(Error::option("--memory", message));
         };
@@ -234,8 +234,7 @@ impl Cached {
 
     /// Begins a frame.
     pub fn begin_frame(&self) {
-        self.was_short.store(self.blocks.is_short(), Ordering::Relaxed);
-        self.blocks.gone.store(0, Ordering::Relaxed);
+        self.was_short.store(self.blocks.begin_frame(), Ordering::Relaxed);
         self.waited.store(self.blocks.waits.swap(0, Ordering::Relaxed), Ordering::Relaxed);
         self.blocks.ahead.begin_frame();
     }

@@ -16,11 +16,13 @@ pub struct Part<T> {
     pub count: usize,
     /// Its first byte among those of all arrays.
     pub base: usize,
-    /// The first byte of the block that was looked at last, or [`NO_BLOCK`]. It is here, and what lies in it needs no
-    /// look at any word or slot.
-    pub last: Cell<usize>,
+    /// Where in the array the block begins that was looked at last, in bytes, or [`NO_BLOCK`]. It is here, and what lies
+    /// in it needs no look at any word or slot.
+    last: Cell<usize>,
     /// Where the array would begin in memory if all of it lay as that block does.
-    pub origin: Cell<*const u8>,
+    origin: Cell<*const u8>,
+    /// Bytes of a block.
+    block: usize,
     of: PhantomData<T>,
 }
 
@@ -33,29 +35,63 @@ impl<T> Part<T> {
         let Column { base, bytes } = blocks.layout.column(array);
         // Right from the beginning where blocks lie in order.
         let (last, origin) = (Cell::new(NO_BLOCK), Cell::new(blocks.slots.home(base)));
-        Self { count: bytes / size_of::<T>(), base, last, origin, of: PhantomData }
+        Self {
+            count: bytes / size_of::<T>(),
+            base,
+            last,
+            origin,
+            block: 1 << blocks.layout.shift(),
+            of: PhantomData,
+        }
+    }
+
+    /// Panics if there are no such elements.
+    #[inline(always)]
+    pub fn check(&self, elements: Range<usize>) {
+        assert!(elements.start <= elements.end && elements.end <= self.count);
     }
 
     /// The bytes of some elements, among those of all arrays. Panics if there are no such elements.
     #[inline(always)]
     pub fn bytes(&self, elements: Range<usize>) -> Range<usize> {
-        assert!(elements.start <= elements.end && elements.end <= self.count);
+        self.check(elements.clone());
         self.base + elements.start * size_of::<T>()..self.base + elements.end * size_of::<T>()
     }
 
-    /// Where so many elements are from one on, if they lie in the block that was looked at last.
+    /// Where an element is, if its block lies as the one does that was looked at last.
     #[inline(always)]
-    pub fn in_last<const N: usize>(&self, first: usize, shift: u32) -> Option<*const [T; N]> {
-        let into = (self.base + first * size_of::<T>()).wrapping_sub(self.last.get());
-        let most = (1_usize << shift) - N * size_of::<T>();
-        if into <= most { Some(self.origin.get().wrapping_add(first * size_of::<T>()).cast()) } else { None }
+    pub fn place(&self, first: usize) -> *const u8 {
+        self.origin.get().wrapping_add(first * size_of::<T>())
     }
 
-    /// Keeps in mind where a block lies that begins with a byte.
+    /// Whether so many elements from one on lie in the block that was looked at last.
+    ///
+    /// A walk asks this at every node: it is a subtraction and a comparison.
     #[inline(always)]
-    pub fn keep(&self, first: usize, place: *const u8) {
-        self.last.set(first);
-        self.origin.set(place.wrapping_sub(first).wrapping_add(self.base));
+    pub fn is_in_last(&self, first: usize, count: usize) -> bool {
+        let into = (first * size_of::<T>()).wrapping_sub(self.last.get());
+        // Ahead of the block it is more than any block has.
+        into < self.block && count * size_of::<T>() <= self.block - into
+    }
+
+    /// Where so many elements are from one on, if they lie in that block.
+    #[inline(always)]
+    pub fn in_last<const N: usize>(&self, first: usize) -> Option<*const [T; N]> {
+        let into = (first * size_of::<T>()).wrapping_sub(self.last.get());
+        if into <= self.block - N * size_of::<T>() { Some(self.place(first).cast()) } else { None }
+    }
+
+    /// Keeps in mind where a block lies that begins with this of all arrays' bytes.
+    #[inline(always)]
+    pub fn keep(&self, byte: usize, place: *const u8) {
+        self.keep_in_order(byte);
+        self.origin.set(place.wrapping_sub(byte - self.base));
+    }
+
+    /// The same where all blocks are at home: the array's origin stays what it is.
+    #[inline(always)]
+    pub fn keep_in_order(&self, byte: usize) {
+        self.last.set(byte - self.base);
     }
 
     /// Nothing is known of any block any more.

@@ -174,7 +174,7 @@ pub struct Plan {
     pub ahead: usize,
     /// All that may have memory, with those that have been given up and are still read.
     pub all: usize,
-    /// Lines of lists that are known, which each thread keeps beside its tree (`cache/known.rs`).
+    /// Lines of lists that are known, which each thread at work keeps beside its tree (`cache/known.rs`).
     pub lines: usize,
 }
 
@@ -183,10 +183,16 @@ pub struct Plan {
 const AHEAD: usize = 16;
 
 impl Plan {
-    /// Divides `blocks`. A walk needs up to `most` at a time; so many threads walk.
+    /// Divides `blocks`. A walk needs up to `most` at a time; so many threads walk, and so many of them at a time.
     ///
     /// `None` if they are too few: fewer than [`least`](Self::least).
-    pub fn new(options: &CacheOptions, blocks: usize, most: usize, workers: usize) -> Option<Self> {
+    pub fn new(
+        options: &CacheOptions,
+        blocks: usize,
+        most: usize,
+        workers: usize,
+        at_work: usize,
+    ) -> Option<Self> {
         if blocks < Self::least(options, most) {
             return None;
         }
@@ -200,7 +206,7 @@ impl Plan {
                 [Some(shape(options, policy, nodes)), Some(shape(options, options.policy, held - nodes))]
             }
         };
-        let lines = Known::lines(blocks * options.block, Self::holders(workers));
+        let lines = Known::lines(blocks * options.block, at_work);
         let mut plan = Self { shapes, pinned, ahead: 0, all: blocks, lines };
         if options.prefetch == Prefetch::Ahead && options.loading.loaders() > 0 {
             // All of them may be nodes, or leaves. One is being read while another is here.
@@ -208,11 +214,6 @@ impl Plan {
             plan.ahead = Some(least / AHEAD).filter(|&ahead| ahead >= 2).unwrap_or(0);
         }
         Some(plan)
-    }
-
-    /// How many may keep lists in mind where so many walk: each of them may look at a surface meanwhile.
-    pub const fn holders(workers: usize) -> usize {
-        2 * workers
     }
 
     /// Blocks that sets hold.
@@ -250,9 +251,9 @@ mod tests {
                 options.check().expect("sensible");
                 for most in [1, 5, 130] {
                     let least = Plan::least(&options, most);
-                    assert_eq!(Plan::new(&options, least - 1, most, 16), None);
+                    assert_eq!(Plan::new(&options, least - 1, most, 16, 2), None);
                     for blocks in [least, least + 1, 1000, 100_000] {
-                        let plan = Plan::new(&options, blocks, most, 16).expect("enough");
+                        let plan = Plan::new(&options, blocks, most, 16, 2).expect("enough");
                         let held = plan.held();
                         assert!(held >= 2 && plan.pinned >= most);
                         let each = plan.shapes.iter().flatten().map(|shape| shape.blocks() / 16);

@@ -38,7 +38,7 @@ fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
     const BLOCKS: usize = 60;
     let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
     let most = 3;
-    let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads).expect("enough");
+    let plan = Plan::new(options, Plan::least(options, most) + 4, most, threads, threads).expect("enough");
     let plan = Plan { ahead: if options.prefetch == Prefetch::Ahead { 3 } else { 0 }, ..plan };
     let (blocks, loaders) = Blocks::new(layout, Box::new(Numbered), options, &plan, threads).expect("starts");
     let late = AtomicU32::new(0);
@@ -75,7 +75,7 @@ fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
                     if options.prefetch == Prefetch::Beside && random(50) == 0 {
                         // Room, and a new frame in which nothing had to go so far.
                         blocks.clear();
-                        blocks.gone.store(0, Ordering::Relaxed);
+                        blocks.begin_frame();
                     }
                     let Ok(gathered) = blocks.gather(loaders, &wanted, || ()) else {
                         late.fetch_add(1, Ordering::Relaxed);

@@ -91,15 +91,17 @@ impl<'a> View<'a> {
         self.slots.at(byte >> self.shift).wrapping_add(into)
     }
 
-    /// Where bytes of an array lie, all together, whose blocks are here.
+    /// Where some elements of an array lie, all together, whose blocks are here.
     #[inline(always)]
-    fn find<T>(&self, part: &Part<T>, bytes: Range<usize>) -> *const u8 {
+    fn find<T>(&self, part: &Part<T>, elements: Range<usize>) -> *const u8 {
+        let start = elements.start;
+        let bytes = part.bytes(elements);
         let block = bytes.start >> self.shift;
         if block != (bytes.end - 1) >> self.shift {
             return self.put_together(bytes);
         }
         part.keep(block << self.shift, self.slots.at(block));
-        part.origin.get().wrapping_add(bytes.start - part.base)
+        part.place(start)
     }
 
     /// A copy of bytes of several blocks.
@@ -128,14 +130,14 @@ impl<'a> View<'a> {
         if elements.is_empty() {
             return &[];
         }
-        let count = elements.len();
-        let bytes = part.bytes(elements);
-        let into = bytes.start.wrapping_sub(part.last.get());
-        let is_in_last = into < 1 << self.shift && bytes.len() <= (1 << self.shift) - into;
-        let first = if self.in_order.get() | is_in_last {
-            part.origin.get().wrapping_add(bytes.start - part.base)
+        let (start, count) = (elements.start, elements.len());
+        let first = if self.in_order.get() {
+            part.check(elements);
+            part.place(start)
+        } else if part.is_in_last(start, count) {
+            part.place(start)
         } else {
-            self.find(part, bytes)
+            self.find(part, elements)
         };
         // SAFETY: so many elements lie there, aligned, as every array begins at the start of a block. They were here
         // when their blocks were entered, this thread is still in that epoch, and nobody writes to a block that is
@@ -147,12 +149,12 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn array<T, const N: usize>(&self, part: &Part<T>, first: usize) -> &[T; N] {
         let place = if self.in_order.get() {
-            let bytes = part.bytes(first..first + N);
-            part.origin.get().wrapping_add(bytes.start - part.base).cast()
+            part.check(first..first + N);
+            part.place(first).cast()
         } else {
-            match part.in_last(first, self.shift) {
+            match part.in_last(first) {
                 Some(place) => place,
-                None => self.find(part, part.bytes(first..first + N)).cast(),
+                None => self.find(part, first..first + N).cast(),
             }
         };
         // SAFETY: as in `slice`.
@@ -166,7 +168,7 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn enter_elements<T, const N: usize>(&self, part: &Part<T>, first: usize) -> *const [T; N] {
         // No closures: they would be functions of their own, without the kernel's instruction set.
-        if let Some(place) = part.in_last(first, self.shift) {
+        if let Some(place) = part.in_last(first) {
             return place;
         }
         let blocks = part.blocks(first..first + N, self.shift);
@@ -177,15 +179,11 @@ impl<'a> View<'a> {
         }
         if self.in_order.get() {
             // Their place hangs on nothing: it is not waited for.
-            part.last.set(last << self.shift);
-            return part.origin.get().wrapping_add(first * size_of::<T>()).cast();
+            part.keep_in_order(last << self.shift);
+            return part.place(first).cast();
         }
         part.keep(last << self.shift, self.slots.at(last));
-        if is_one {
-            part.origin.get().wrapping_add(first * size_of::<T>()).cast()
-        } else {
-            self.put_together(part.bytes(first..first + N)).cast()
-        }
+        if is_one { part.place(first).cast() } else { self.put_together(part.bytes(first..first + N)).cast() }
     }
 
     #[cold]

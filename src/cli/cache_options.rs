@@ -192,7 +192,7 @@ impl CacheReport {
             Loading::Synchronous => "read by who needs them".into(),
             Loading::Asynchronous { loaders } => format!("read by {}", counted(loaders as u64, "loader")),
         };
-        lines.add("cache", format!("{policy}, blocks of {} KiB, {who}", block >> 10));
+        lines.add("cache", format!("{policy}, blocks of {}, {who}", bytes(block as u64)));
         let CacheStats { loads, bytes_read, stalled, prefetched, prefetched_used, prefetched_unused, .. } =
             self.stats;
         lines.add(

@@ -243,7 +243,9 @@ fn rays_to_a_light_go_together_and_see_the_same() {
 fn beams_that_do_not_pay_are_given_up() {
     let closed = sphere(5);
     let mut scene = Scene::new("sprayed", 0, closed.mesh.clone());
-    for seed in seeds() {
+    // From most places no beam begins, and from some it is done before its patience ends. From these it is given up.
+    let known = [2, 4, 10, 20];
+    for seed in known.into_iter().chain(seeds()) {
         scene.seed = seed;
         let mut numbers = Numbers::new(seed, 44);
         let eye = closed.inside(&mut numbers);
@@ -259,9 +261,8 @@ fn beams_that_do_not_pay_are_given_up() {
             accel.count_tile(packets, &[0xffff; 16], false, &mut counts);
         }
         assert!(counts.tests < 2048 * counts.beams.max(1), "{counts:?}");
-        // From a place that chance chooses, one time in five, a beam is done before its patience ends.
-        if [1, 2].contains(&seed) {
-            assert!(counts.alone >= 16 * counts.beams, "{counts:?}");
+        if known.contains(&seed) {
+            assert!(counts.beams == 4 && counts.alone >= 16 * counts.beams, "{counts:?}");
         }
     }
 }
