@@ -185,12 +185,12 @@ impl Slots {
     fn take(&self, block: u32, earliest: impl FnOnce() -> u64) -> u32 {
         let mut state = self.state();
         state.used += 1;
-        if !self.are_in_order() && state.left_at.is_some_and(|left| left < earliest()) {
-            state.left_at = None;
-        }
-        if self.are_in_order() || state.left_at.is_some() {
+        // A reader may still be there that was when the order was given up, and knows nothing of it.
+        let is_relied_on = self.are_in_order() || state.left_at.is_some_and(|left| earliest() <= left);
+        if is_relied_on {
             return self.nowhere + 1 + block;
         }
+        state.left_at = None;
         state.back.pop().unwrap_or_else(|| {
             assert!(state.next < self.nowhere, "no more blocks come than there are slots for");
             state.next += 1;

@@ -3,7 +3,8 @@
 //! A cache is set-associative: a block has one set that it can lie in, and a set has so many *ways*. A policy
 //! looks at the ways of one set, oldest arrival first, when one of them has to go; nothing is told to it when
 //! a block is used, because a hit must cost next to nothing. What it may ask is a block's [`Use`]: the tick of
-//! its last use, and in how many ticks it was used. A tick is some squares of a picture.
+//! its last use, and in how many ticks it was used. A tick is some squares of a picture, or as long as nothing has to go, a
+//! frame.
 //!
 //! | policy | file | gives up |
 //! |---|---|---|
