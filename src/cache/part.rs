@@ -65,8 +65,6 @@ impl<T> Part<T> {
     }
 
     /// Whether so many elements from one on lie in the block that was looked at last.
-    ///
-    /// A walk asks this at every node: it is a subtraction and a comparison.
     #[inline(always)]
     pub fn is_in_last(&self, first: usize, count: usize) -> bool {
         let into = (first * size_of::<T>()).wrapping_sub(self.last.get());
@@ -75,6 +73,8 @@ impl<T> Part<T> {
     }
 
     /// Where so many elements are from one on, if they lie in that block.
+    ///
+    /// A walk asks this at every node: with a number that is known beforehand it is a subtraction and a comparison.
     #[inline(always)]
     pub fn in_last<const N: usize>(&self, first: usize) -> Option<*const [T; N]> {
         let into = (first * size_of::<T>()).wrapping_sub(self.last.get());
