@@ -10,6 +10,7 @@
 //! runs toward that plane comes to its wall first; one that runs away from it never does, unless it starts in
 //! the wall, and then what is left of the line begins where the ray does.
 
+use super::leaf::Leaf;
 use super::step::{Crossing, END, Waiting};
 use crate::geometry::triangle::Test;
 use crate::geometry::{Aabb, Ray};
@@ -35,8 +36,8 @@ pub struct Flight<A> {
     pub tfar: f32,
     /// The closest triangle.
     pub primitive: u32,
-    /// Its weights, as the test gives them.
-    pub weights: [f32; 2],
+    /// The leaf that it is in.
+    pub leaf: Leaf,
     /// Prepared for triangles.
     pub test: A,
 }
@@ -230,7 +231,7 @@ impl Group {
             tnear: ray.tnear,
             tfar: ray.tfar.min(f32::MAX),
             primitive: NONE,
-            weights: [0.0; 2],
+            leaf: Leaf::NONE,
             test: A::new(&ray.origin.to_array(), &ray.direction.to_array(), 1),
         }
     }

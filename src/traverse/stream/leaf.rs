@@ -1,82 +1,124 @@
 //! One ray against the triangles of a leaf, eight at a time.
 //!
-//! The mode sifts eight triangles at once; those that may be hit go through its own test. So hits are what
-//! packets find, bit for bit.
+//! The mode sifts eight triangles at once, and what it finds is kept with the ray. Most eights hold nothing: those
+//! rays go on at once, by arithmetic alone. The others stand in a list of their own, in which every ray has
+//! something to look at: what is in doubt goes through the mode's own test, and the nearest is taken. So hits are
+//! what packets find, bit for bit, and no branch depends on whether a triangle is hit.
 
 use super::flight::Flight;
-use crate::geometry::triangle::{Alone, Finds};
-use crate::simd::{Eight, Mask};
+use crate::geometry::triangle::Alone;
+use crate::simd::{Eight, Mask, prefetch};
+use std::hint::select_unpredictable;
 
-/// Tests the triangles of the leaf whose record begins at `record` in `words`, and says whether one was hit.
-#[inline(always)]
-pub fn visit<L: Eight, A: Alone>(
-    flight: &mut Flight<A>,
-    words: &[u32],
-    record: usize,
-    records: &[A::Record],
-) -> bool {
-    let mut found = false;
-    let mut rest = words[record] as usize;
-    let mut next = record + 1;
-    let last = records.len() as u32 - 1;
-    loop {
-        // What follows the leaf's last triangle is of no account, but must be some triangle.
-        let primitives: &[u32; 8] = words[next..].first_chunk().expect("words behind the last record");
-        let mut triangles = [&records[0]; 8];
-        for lane in 0..8 {
-            triangles[lane] = &records[primitives[lane].min(last) as usize];
+/// Where a ray is in its leaf: eight triangles, and what it found in them.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub struct Leaf {
+    /// The triangles' ids. Behind the leaf's last one is the first of the eight again.
+    primitives: [i32; 8],
+    /// `t` of those in `hits`.
+    t: [f32; 8],
+    /// Triangles that are hit, and those that are in doubt.
+    hits: u32,
+    open: u32,
+    /// The word behind the eight, and how many triangles are left with them.
+    next: u32,
+    left: u32,
+}
+
+impl Leaf {
+    /// No leaf.
+    pub const NONE: Self = Self { primitives: [0; 8], t: [0.0; 8], hits: 0, open: 0, next: 0, left: 0 };
+
+    /// Whether the eight have something to look at.
+    #[inline(always)]
+    pub fn has_found(&self) -> bool {
+        self.hits | self.open != 0
+    }
+
+    /// Whether others follow.
+    #[inline(always)]
+    pub fn goes_on(&self) -> bool {
+        self.left > 8
+    }
+
+    /// Goes to the leaf whose record begins at `record` in `words`.
+    #[inline(always)]
+    pub fn enter<L: Eight, R>(&mut self, words: &[u32], record: usize, records: &[R]) {
+        (self.next, self.left) = (record as u32 + 1, words[record]);
+        self.bring::<L, R>(words, records);
+    }
+
+    /// Goes on to the next eight triangles.
+    #[inline(always)]
+    pub fn advance<L: Eight, R>(&mut self, words: &[u32], records: &[R]) {
+        self.left -= 8;
+        self.bring::<L, R>(words, records);
+    }
+
+    /// Fetches the next eight triangles.
+    #[inline(always)]
+    fn bring<L: Eight, R>(&mut self, words: &[u32], records: &[R]) {
+        let words = words[self.next as usize..].first_chunk().expect("words behind the last record");
+        let ids = L::ids_load(bytemuck::cast_ref::<[u32; 8], [i32; 8]>(words));
+        let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
+        self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
+        self.next += 8;
+        for primitive in self.primitives {
+            let record = records.as_ptr().wrapping_add(primitive as usize);
+            prefetch(record);
+            prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
         }
-        let lanes = (1 << rest.min(8)) - 1;
-        let finds = flight.test.find::<L>(&triangles, flight.tnear, flight.tfar);
-        let hits = finds.hits.bits() & lanes;
-        if hits != 0 {
-            found |= flight.take_nearest(&finds, hits, primitives);
-        }
-        let mut open = finds.open & lanes;
-        while open != 0 {
-            let lane = open.trailing_zeros() as usize & 7;
-            open &= open - 1;
-            let candidate = flight.test.test(triangles[lane], true);
-            if candidate.inside && flight.tnear <= candidate.t {
-                found |= flight.take(candidate.t, primitives[lane], [candidate.u, candidate.v]);
-            }
-        }
-        if rest <= 8 {
-            return found;
-        }
-        rest -= 8;
-        next += 8;
     }
 }
 
 impl<A: Alone> Flight<A> {
-    /// Takes a hit if it is nearer than what the ray has, or as near and of a lower id; says whether it is.
+    /// Sifts the eight triangles that were fetched.
     #[inline(always)]
-    fn take(&mut self, t: f32, primitive: u32, weights: [f32; 2]) -> bool {
-        let nearer = t < self.tfar || t == self.tfar && primitive < self.primitive;
-        if nearer {
-            (self.tfar, self.primitive, self.weights) = (t, primitive, weights);
+    pub fn sift<L: Eight>(&mut self, records: &[A::Record]) {
+        let mut triangles = [&records[0]; 8];
+        for lane in 0..8 {
+            triangles[lane] = &records[self.leaf.primitives[lane] as usize];
         }
-        nearer
+        let lanes = (1 << self.leaf.left.min(8)) - 1;
+        let finds = self.test.find::<L>(&triangles, self.tnear, self.tfar);
+        self.leaf.t = finds.t.store();
+        self.leaf.hits = finds.hits.bits() & lanes;
+        self.leaf.open = finds.open & lanes;
     }
 
-    /// The same for the nearest of the lanes in `hits`, of which there is one at least.
+    /// Takes the nearest of what was found, and says whether it is nearer than what the ray had.
     #[inline(always)]
-    fn take_nearest<L: Eight>(&mut self, finds: &Finds<L>, hits: u32, primitives: &[u32; 8]) -> bool {
-        let t = L::select(L::mask_from_bits(hits), finds.t, L::splat(f32::INFINITY));
-        let least = t.least();
-        let mut nearest = t.eq(L::splat(least)).bits() & hits;
-        let mut lane = nearest.trailing_zeros() as usize & 7;
-        nearest &= nearest.wrapping_sub(1);
-        while nearest != 0 {
-            let other = nearest.trailing_zeros() as usize & 7;
-            nearest &= nearest - 1;
-            if primitives[other] < primitives[lane] {
-                lane = other;
+    pub fn settle<L: Eight>(&mut self, records: &[A::Record]) -> bool {
+        let Leaf { primitives, t, hits, mut open, .. } = self.leaf;
+        let mut found = false;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize & 7;
+            open &= open - 1;
+            let candidate = self.test.test(&records[primitives[lane] as usize], true);
+            if candidate.inside && self.tnear <= candidate.t {
+                found |= self.take(candidate.t, primitives[lane] as u32);
             }
         }
-        let [b, c, sum] = finds.weights;
-        let (b, c, sum) = (b.store()[lane], c.store()[lane], sum.store()[lane]);
-        self.take(least, primitives[lane], [b / sum, c / sum])
+
+        // Of several that are as near the one with the lowest id counts.
+        let t = L::select(L::mask_from_bits(hits), L::load(&t), L::splat(f32::INFINITY));
+        let least = t.least();
+        let mut nearest = t.eq(L::splat(least)).bits() & hits;
+        while nearest != 0 {
+            let lane = nearest.trailing_zeros() as usize & 7;
+            nearest &= nearest - 1;
+            found |= self.take(least, primitives[lane] as u32);
+        }
+        found
+    }
+
+    /// Takes a hit if it is nearer than what the ray has, or as near and of a lower id; says whether it is.
+    #[inline(always)]
+    fn take(&mut self, t: f32, primitive: u32) -> bool {
+        let nearer = t < self.tfar || t == self.tfar && primitive < self.primitive;
+        self.tfar = select_unpredictable(nearer, t, self.tfar);
+        self.primitive = select_unpredictable(nearer, primitive, self.primitive);
+        nearer
     }
 }

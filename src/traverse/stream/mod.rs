@@ -62,7 +62,8 @@ impl Answers for Closest<'_> {
     #[inline(always)]
     fn found<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>) {
         let record = &tree.records[flight.primitive as usize];
-        let [u, v] = M::Alone::weights(record, flight.weights[0], flight.weights[1]);
+        let [u, v] = flight.test.weigh(record, true);
+        let [u, v] = M::Alone::weights(record, u, v);
         // A zero is given out without a sign.
         self.0[flight.ray as usize] = Hit {
             t: flight.tfar + 0.0,
@@ -110,15 +111,19 @@ impl Answers for Any<'_> {
     }
 }
 
-/// Rays in flight that wait for the same work.
-struct List {
-    flights: [u16; 2 * IN_FLIGHT],
+/// Places for all rays in flight, and for one that is not to be there.
+type Places = [u16; IN_FLIGHT + 1];
+
+/// Rays in flight that wait for the same work. (The length stands apart from the array, so that it can be kept in
+/// a register.)
+struct List<'a> {
+    flights: &'a mut Places,
     len: usize,
 }
 
-impl List {
-    const fn new() -> Self {
-        Self { flights: [0; 2 * IN_FLIGHT], len: 0 }
+impl<'a> List<'a> {
+    const fn new(flights: &'a mut Places) -> Self {
+        Self { flights, len: 0 }
     }
 
     /// Puts a ray on the list if it is to be there.
@@ -128,41 +133,28 @@ impl List {
         self.len += usize::from(wanted);
     }
 
-    /// Moves all that is on another list to this one.
     #[inline(always)]
-    fn append(&mut self, other: &mut Self) {
-        for &flight in other.all() {
-            self.push_if(usize::from(flight), true);
-        }
-        other.len = 0;
-    }
-
-    #[inline(always)]
-    fn all(&self) -> &[u16] {
-        &self.flights[..self.len]
+    fn get(&self, index: usize) -> usize {
+        usize::from(self.flights[index])
     }
 }
 
-/// Who has to do what in the next round.
-struct Lists {
-    lines: List,
-    leaves: List,
-    ended: List,
+/// What a ray goes on with.
+struct Lists<'a> {
+    lines: List<'a>,
+    leaves: List<'a>,
+    ended: List<'a>,
 }
 
-impl Lists {
-    const fn new() -> Self {
-        Self { lines: List::new(), leaves: List::new(), ended: List::new() }
-    }
-
-    /// Puts a ray on the list for the exit that it takes, and fetches what it will need.
+impl Lists<'_> {
+    /// Puts a ray on the list for the exit that it takes, if it goes on at all, and fetches what it will need.
     #[inline(always)]
-    fn route(&mut self, tree: &KdTree, flight: usize, exit: i32) {
+    fn route(&mut self, tree: &KdTree, flight: usize, exit: i32, goes_on: bool) {
         let ended = exit == END;
         let exit = Exit(exit);
-        self.lines.push_if(flight, !exit.is_leaf());
-        self.leaves.push_if(flight, exit.is_leaf() & !ended);
-        self.ended.push_if(flight, ended);
+        self.lines.push_if(flight, !exit.is_leaf() & goes_on);
+        self.leaves.push_if(flight, exit.is_leaf() & !ended & goes_on);
+        self.ended.push_if(flight, ended & goes_on);
         let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
         let record = tree.references().as_ptr().wrapping_add(exit.record());
         prefetch(select_unpredictable(exit.is_leaf(), record, line));
@@ -198,14 +190,36 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     let Resident { tree, records } = *resident;
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
-    let (mut one, mut other) = (Lists::new(), Lists::new());
-    let (mut now, mut next) = (&mut one, &mut other);
-    let mut triangles = List::new();
+    let [mut a, mut b, mut c, mut d, mut e, mut f] = [[0; IN_FLIGHT + 1]; 6];
+    let mut next = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
+    let (mut triangles, mut hits, mut more) = (List::new(&mut d), List::new(&mut e), List::new(&mut f));
     let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
     let mut ahead = 0;
     let mut group = Group::new();
     let plain = tree.scale().is_none();
     loop {
+        // Leaves whose records are here.
+        for i in 0..next.leaves.len {
+            let k = next.leaves.get(i);
+            let flight = &mut flights[k];
+            let exit = Exit(stacks[k].exits[flight.top as usize]);
+            flight.leaf.enter::<S::F8, _>(tree.references(), exit.record(), records);
+            triangles.push_if(k, true);
+        }
+        next.leaves.len = 0;
+
+        // Lines. Those who go on with a line stay on the list.
+        let lines_here = next.lines.len;
+        next.lines.len = 0;
+        for i in 0..lines_here {
+            let k = next.lines.get(i);
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let top = flight.top as usize;
+            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            flight.top = top as u32;
+            next.route(tree, k, waiting.exits[top], true);
+        }
+
         // New rays in the place of those that have ended, eight at a time.
         while ahead < rays.len() && free.len() >= 8 {
             let eight = &rays[ahead..rays.len().min(ahead + 8)];
@@ -219,7 +233,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 } else {
                     let k = usize::from(free.pop().expect("as many as rays"));
                     let flight = group.start(lane, ray, number, &mut stacks[k]);
-                    now.route(tree, k, stacks[k].exits[flight.top as usize]);
+                    next.route(tree, k, stacks[k].exits[flight.top as usize], true);
                     if k == flights.len() {
                         flights.push(flight);
                     } else {
@@ -233,61 +247,53 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             return;
         }
 
-        // Leaves whose triangles are here.
-        for &k in triangles.all() {
-            let k = usize::from(k);
-            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            let mut top = flight.top as usize;
-            let record = Exit(waiting.exits[top]).record();
-            top -= 1;
-            if leaf::visit::<S::F8, M::Alone>(flight, tree.references(), record, records) {
-                if A::ANY {
-                    top = 0;
-                }
-                while waiting.tmin[top] > flight.tfar {
-                    top -= 1;
-                }
-            }
-            flight.top = top as u32;
-            next.route(tree, k, waiting.exits[top]);
+        // Triangles. Where nothing is found, and none are left, a ray goes on with what is next on its stack.
+        for i in 0..triangles.len {
+            let k = triangles.get(i);
+            let (flight, waiting) = (&mut flights[k], &stacks[k]);
+            flight.sift::<S::F8>(records);
+            let (found, goes_on) = (flight.leaf.has_found(), flight.leaf.goes_on());
+            hits.push_if(k, found);
+            more.push_if(k, !found & goes_on);
+            let leaves = !found & !goes_on;
+            flight.top -= u32::from(leaves);
+            next.route(tree, k, waiting.exits[flight.top as usize], leaves);
         }
         triangles.len = 0;
 
-        // Leaves whose records are here.
-        for &k in now.leaves.all() {
-            let exit = Exit(stacks[usize::from(k)].exits[flights[usize::from(k)].top as usize]);
-            for &primitive in tree.record(exit.record()) {
-                let record = records.as_ptr().wrapping_add(primitive as usize);
-                prefetch(record);
-                prefetch(record.cast::<u8>().wrapping_add(size_of::<M::Record>() - 1));
-            }
-            triangles.push_if(usize::from(k), true);
-        }
-        now.leaves.len = 0;
-
-        // Lines.
-        for &k in now.lines.all() {
-            let k = usize::from(k);
+        // Hits.
+        for i in 0..hits.len {
+            let k = hits.get(i);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            let top = flight.top as usize;
-            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            let ends = flight.settle::<S::F8>(records) & A::ANY;
+            let leaves = ends | !flight.leaf.goes_on();
+            more.push_if(k, !leaves);
+            let top = select_unpredictable(ends, 0, flight.top - u32::from(leaves)) as usize;
+            let top = if leaves { waiting.reached::<S::F8>(top, flight.tfar) } else { top };
             flight.top = top as u32;
-            next.route(tree, k, waiting.exits[top]);
+            next.route(tree, k, waiting.exits[top], leaves);
         }
-        now.lines.len = 0;
+        hits.len = 0;
+
+        // Leaves with more triangles.
+        for i in 0..more.len {
+            let k = more.get(i);
+            flights[k].leaf.advance::<S::F8, _>(tree.references(), records);
+            triangles.push_if(k, true);
+        }
+        more.len = 0;
 
         // Rays that have ended.
-        next.ended.append(&mut now.ended);
-        for &k in next.ended.all() {
-            let flight = &flights[usize::from(k)];
+        for i in 0..next.ended.len {
+            let k = next.ended.get(i);
+            let flight = &flights[k];
             if flight.primitive == NONE {
                 answers.missed(flight.ray as usize);
             } else {
                 answers.found::<M>(resident, flight);
             }
-            free.push(k);
+            free.push(k as u16);
         }
         next.ended.len = 0;
-        std::mem::swap(&mut now, &mut next);
     }
 }

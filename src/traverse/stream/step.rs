@@ -38,6 +38,21 @@ pub struct Waiting {
 }
 
 impl Waiting {
+    /// The highest place from `top` down where something is left of the interval of a ray that ends at `tfar`. At
+    /// the bottom there always is.
+    #[inline(always)]
+    pub fn reached<L: Eight>(&mut self, mut top: usize, tfar: f32) -> usize {
+        loop {
+            let from = top.saturating_sub(7);
+            let lanes = (2 << (top - from)) - 1;
+            let begun = L::load(eight(&mut self.tmin, from)).le(L::splat(tfar)).bits() & lanes;
+            if begun != 0 {
+                return from + begun.ilog2() as usize;
+            }
+            top = from - 1;
+        }
+    }
+
     /// A stack with nothing on it.
     pub const fn new() -> Self {
         Self { exits: [END; DEPTH], tmin: [f32::NEG_INFINITY; DEPTH], tmax: [f32::NEG_INFINITY; DEPTH] }
