@@ -36,34 +36,24 @@ impl Leaf {
         self.hits | self.open != 0
     }
 
-    /// Whether others follow.
+    /// Whether others of the leaf follow. (In no leaf they do not.)
     #[inline(always)]
     pub fn goes_on(&self) -> bool {
         self.left > 8
     }
 
-    /// Goes to the leaf whose record begins at `record` in `words`.
+    /// Fetches the next eight triangles: others of the same leaf if some are left, or else the first ones of the leaf
+    /// whose record begins at `record` in `words`.
     #[inline(always)]
-    pub fn enter<L: Eight, R>(&mut self, words: &[u32], record: usize, records: &[R]) {
-        (self.next, self.left) = (record as u32 + 1, words[record]);
-        self.bring::<L, R>(words, records);
-    }
-
-    /// Goes on to the next eight triangles.
-    #[inline(always)]
-    pub fn advance<L: Eight, R>(&mut self, words: &[u32], records: &[R]) {
-        self.left -= 8;
-        self.bring::<L, R>(words, records);
-    }
-
-    /// Fetches the next eight triangles.
-    #[inline(always)]
-    fn bring<L: Eight, R>(&mut self, words: &[u32], records: &[R]) {
+    pub fn fetch<L: Eight, R>(&mut self, words: &[u32], record: usize, records: &[R]) {
+        let goes_on = self.goes_on();
+        self.next = select_unpredictable(goes_on, self.next, record as u32 + 1);
+        self.left = select_unpredictable(goes_on, self.left.wrapping_sub(8), words[record]);
         let words = words[self.next as usize..].first_chunk().expect("words behind the last record");
+        self.next += 8;
         let ids = L::ids_load(bytemuck::cast_ref::<[u32; 8], [i32; 8]>(words));
         let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
         self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
-        self.next += 8;
         for primitive in self.primitives {
             let record = records.as_ptr().wrapping_add(primitive as usize);
             prefetch(record);

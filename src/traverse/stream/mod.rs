@@ -190,9 +190,9 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     let Resident { tree, records } = *resident;
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
-    let [mut a, mut b, mut c, mut d, mut e, mut f] = [[0; IN_FLIGHT + 1]; 6];
+    let [mut a, mut b, mut c, mut d, mut e] = [[0; IN_FLIGHT + 1]; 5];
     let mut next = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
-    let (mut triangles, mut hits, mut more) = (List::new(&mut d), List::new(&mut e), List::new(&mut f));
+    let (mut triangles, mut hits) = (List::new(&mut d), List::new(&mut e));
     let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
     let mut ahead = 0;
     let mut group = Group::new();
@@ -203,7 +203,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             let k = next.leaves.get(i);
             let flight = &mut flights[k];
             let exit = Exit(stacks[k].exits[flight.top as usize]);
-            flight.leaf.enter::<S::F8, _>(tree.references(), exit.record(), records);
+            flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
             triangles.push_if(k, true);
         }
         next.leaves.len = 0;
@@ -234,11 +234,11 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                     let k = usize::from(free.pop().expect("as many as rays"));
                     let flight = group.start(lane, ray, number, &mut stacks[k]);
                     next.route(tree, k, stacks[k].exits[flight.top as usize], true);
-                    if k == flights.len() {
-                        flights.push(flight);
-                    } else {
-                        flights[k] = flight;
+                    if flights.is_empty() {
+                        // The others are written over before they are looked at.
+                        flights.resize(IN_FLIGHT, flight);
                     }
+                    flights[k] = flight;
                 }
             }
             ahead += eight.len();
@@ -247,17 +247,16 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             return;
         }
 
-        // Triangles. Where nothing is found, and none are left, a ray goes on with what is next on its stack.
+        // Triangles. Where nothing is found, a ray goes on with the next ones of its leaf, or if that was all, with what
+        // is next on its stack.
         for i in 0..triangles.len {
             let k = triangles.get(i);
             let (flight, waiting) = (&mut flights[k], &stacks[k]);
             flight.sift::<S::F8>(records);
             let (found, goes_on) = (flight.leaf.has_found(), flight.leaf.goes_on());
             hits.push_if(k, found);
-            more.push_if(k, !found & goes_on);
-            let leaves = !found & !goes_on;
-            flight.top -= u32::from(leaves);
-            next.route(tree, k, waiting.exits[flight.top as usize], leaves);
+            flight.top -= u32::from(!found & !goes_on);
+            next.route(tree, k, waiting.exits[flight.top as usize], !found);
         }
         triangles.len = 0;
 
@@ -266,22 +265,14 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             let k = hits.get(i);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let ends = flight.settle::<S::F8>(records) & A::ANY;
-            let leaves = ends | !flight.leaf.goes_on();
-            more.push_if(k, !leaves);
-            let top = select_unpredictable(ends, 0, flight.top - u32::from(leaves)) as usize;
-            let top = if leaves { waiting.reached::<S::F8>(top, flight.tfar) } else { top };
+            let mut top = flight.top as usize;
+            if ends | !flight.leaf.goes_on() {
+                top = waiting.reached::<S::F8>(select_unpredictable(ends, 0, top - 1), flight.tfar);
+            }
             flight.top = top as u32;
-            next.route(tree, k, waiting.exits[top], leaves);
+            next.route(tree, k, waiting.exits[top], true);
         }
         hits.len = 0;
-
-        // Leaves with more triangles.
-        for i in 0..more.len {
-            let k = more.get(i);
-            flights[k].leaf.advance::<S::F8, _>(tree.references(), records);
-            triangles.push_if(k, true);
-        }
-        more.len = 0;
 
         // Rays that have ended.
         for i in 0..next.ended.len {
