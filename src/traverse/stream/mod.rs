@@ -2,16 +2,19 @@
 //!
 //! Incoherent rays have nothing to share, and one by one they spend their time waiting for memory and on
 //! branches that nobody can foresee. Here some thirty rays are on their way at once. Each round does one
-//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or a leaf. Rays that
-//! need the same work stand in one list, so that no branch depends on what a ray meets; and what a ray
-//! needs in its next round is fetched while the others have theirs.
+//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or eight triangles of a leaf
+//! ([`leaf`]). Rays that need the same work stand in one list, so that no branch depends on what a ray meets; and what
+//! a ray needs in its next round is fetched while the others have theirs.
 //!
 //! ```text
-//!          +--------------------------------------------+
-//!          v                                            |
-//! start -> lines -> leaves  -> triangles -> (next on the stack) -> end: the next ray starts
-//!  fetch:  line     record     triangles
+//!          +---------+---------------------------------------+
+//!          v         v                    nothing            |
+//! start -> lines -> leaves -> triangles ---------> (next in the leaf or on the stack) -> end: the next ray starts
+//!  fetch:  line     record    triangles --> hits --->^
 //! ```
+//!
+//! Rays that found something in their triangles have a list of their own too: with a branch for each eight instead,
+//! and one for each leaf that is longer, rays took 1.05 to 1.27 times as long.
 //!
 //! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
 //! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not
@@ -191,7 +194,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
     let [mut a, mut b, mut c, mut d, mut e] = [[0; IN_FLIGHT + 1]; 5];
-    let mut next = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
+    let mut lists = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
     let (mut triangles, mut hits) = (List::new(&mut d), List::new(&mut e));
     let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
     let mut ahead = 0;
@@ -199,25 +202,25 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     let plain = tree.scale().is_none();
     loop {
         // Leaves whose records are here.
-        for i in 0..next.leaves.len {
-            let k = next.leaves.get(i);
+        for i in 0..lists.leaves.len {
+            let k = lists.leaves.get(i);
             let flight = &mut flights[k];
             let exit = Exit(stacks[k].exits[flight.top as usize]);
             flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
             triangles.push_if(k, true);
         }
-        next.leaves.len = 0;
+        lists.leaves.len = 0;
 
         // Lines. Those who go on with a line stay on the list.
-        let lines_here = next.lines.len;
-        next.lines.len = 0;
+        let lines_here = lists.lines.len;
+        lists.lines.len = 0;
         for i in 0..lines_here {
-            let k = next.lines.get(i);
+            let k = lists.lines.get(i);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
             let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
             flight.top = top as u32;
-            next.route(tree, k, waiting.exits[top], true);
+            lists.route(tree, k, waiting.exits[top], true);
         }
 
         // New rays in the place of those that have ended, eight at a time.
@@ -233,7 +236,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 } else {
                     let k = usize::from(free.pop().expect("as many as rays"));
                     let flight = group.start(lane, ray, number, &mut stacks[k]);
-                    next.route(tree, k, stacks[k].exits[flight.top as usize], true);
+                    lists.route(tree, k, stacks[k].exits[flight.top as usize], true);
                     if flights.is_empty() {
                         // The others are written over before they are looked at.
                         flights.resize(IN_FLIGHT, flight);
@@ -256,7 +259,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             let (found, goes_on) = (flight.leaf.has_found(), flight.leaf.goes_on());
             hits.push_if(k, found);
             flight.top -= u32::from(!found & !goes_on);
-            next.route(tree, k, waiting.exits[flight.top as usize], !found);
+            lists.route(tree, k, waiting.exits[flight.top as usize], !found);
         }
         triangles.len = 0;
 
@@ -270,13 +273,13 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 top = waiting.reached::<S::F8>(select_unpredictable(ends, 0, top - 1), flight.tfar);
             }
             flight.top = top as u32;
-            next.route(tree, k, waiting.exits[top], true);
+            lists.route(tree, k, waiting.exits[top], true);
         }
         hits.len = 0;
 
         // Rays that have ended.
-        for i in 0..next.ended.len {
-            let k = next.ended.get(i);
+        for i in 0..lists.ended.len {
+            let k = lists.ended.get(i);
             let flight = &flights[k];
             if flight.primitive == NONE {
                 answers.missed(flight.ray as usize);
@@ -285,6 +288,6 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             }
             free.push(k as u16);
         }
-        next.ended.len = 0;
+        lists.ended.len = 0;
     }
 }
