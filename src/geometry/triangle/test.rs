@@ -73,15 +73,13 @@ pub trait Alone: Test<1, f32> {
     fn find<L: Eight>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> Finds<L>;
 }
 
-/// What a ray finds of eight triangles, a lane each.
+/// What a ray finds of eight triangles, a lane each. (Weights are for [`weigh`](Test::weigh) to say, of the hit that counts
+/// in the end.)
 pub struct Finds<L: Eight> {
     /// Triangles that are hit.
     pub hits: L::Mask,
     /// The ray's parameter, in the lanes of `hits`.
     pub t: L,
-    /// Two numbers in proportion to the weights of the second and third corner, and what they are to be divided
-    /// by.
-    pub weights: [L; 3],
     /// A bit for each triangle of which [`test`](Test::test) has yet to say whether it is hit. None is in `hits`.
     pub open: u32,
 }
@@ -90,8 +88,7 @@ impl<L: Eight> Finds<L> {
     /// Nothing but triangles to be tested.
     #[inline(always)]
     pub(super) fn open(open: u32) -> Self {
-        let zero = L::splat(0.0);
-        Self { hits: L::mask_from_bits(0), t: zero, weights: [zero; 3], open }
+        Self { hits: L::mask_from_bits(0), t: L::splat(0.0), open }
     }
 }
 

@@ -112,3 +112,50 @@ impl<A: Alone> Flight<A> {
         nearer
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Chosen, Isa, Simd, Task};
+
+    /// Fetches all triangles of the leaves with these records, one leaf after the other.
+    struct Fetch<'a>(&'a [u32], &'a [usize]);
+
+    impl Task for Fetch<'_> {
+        type Output = Vec<i32>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Vec<i32> {
+            let (mut leaf, mut fetched) = (Leaf::NONE, Vec::new());
+            for &record in self.1 {
+                loop {
+                    leaf.fetch::<S::F8, u32>(self.0, record, &[]);
+                    let (these, others) = leaf.primitives.split_at(leaf.left.min(8) as usize);
+                    fetched.extend(these);
+                    assert!(others.iter().all(|&other| other == these[0]), "others are no triangles");
+                    if !leaf.goes_on() {
+                        break;
+                    }
+                }
+            }
+            fetched
+        }
+    }
+
+    #[test]
+    fn a_leafs_triangles_come_by_eights_each_once() {
+        // Leaves of 1 to 26 triangles, and the words behind the last record.
+        let (mut words, mut records) = (Vec::new(), Vec::new());
+        for count in 1..27 {
+            records.push(words.len());
+            words.push(count);
+            words.extend((0..count).map(|i| 100 * count + i));
+        }
+        words.extend([0; 7]);
+        let wanted: Vec<i32> = (1..27).flat_map(|count| (0..count).map(move |i| 100 * count + i)).collect();
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            assert_eq!(chosen.run(Fetch(&words, &records)), wanted, "{isa}");
+        }
+    }
+}

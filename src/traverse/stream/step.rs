@@ -149,3 +149,42 @@ static OPEN: [[i32; 8]; 16] = {
     }
     rows
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Chosen, Isa, Simd, Task};
+
+    struct Reached<'a>(&'a mut Waiting, usize, f32);
+
+    impl Task for Reached<'_> {
+        type Output = usize;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> usize {
+            self.0.reached::<S::F8>(self.1, self.2)
+        }
+    }
+
+    #[test]
+    fn a_ray_goes_on_with_the_topmost_of_what_begins_before_its_end() {
+        let mut state = 0.0f32;
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            for top in 0..60 {
+                // What lies above the top is of no account.
+                let mut waiting = Waiting::new();
+                for (place, tmin) in waiting.tmin.iter_mut().enumerate().skip(1).take(top) {
+                    state = (state + 0.618_034).fract();
+                    // Mostly nearer toward the top.
+                    *tmin = (60 - place) as f32 + 8.0 * state;
+                }
+                for tfar in [-1.0, 0.0, 2.0, 10.0, 25.0, 40.0, 100.0] {
+                    let begun = |place: &usize| waiting.tmin[*place] <= tfar;
+                    let wanted = (0..=top).rev().find(begun).expect("the bottom is always reached");
+                    assert_eq!(chosen.run(Reached(&mut waiting, top, tfar)), wanted, "{isa}, {top}, {tfar}");
+                }
+            }
+        }
+    }
+}

@@ -102,7 +102,7 @@ impl Alone for Shear<1, f32> {
         let sum = a + b + c;
         let hits = inside & !open & (sum.lt(zero) | zero.lt(sum));
         let hits = hits & L::splat(tnear).le(t) & t.le(L::splat(tfar));
-        Finds { hits, t, weights: [b, c, sum], open: open.bits() }
+        Finds { hits, t, open: open.bits() }
     }
 }
 
@@ -127,9 +127,9 @@ mod tests {
             let Self(ray, triangles, [tnear, tfar]) = self;
             let finds = ray.find::<S::F8>(triangles, tnear, tfar);
             let (hits, t) = (finds.hits.bits() & 0xff, finds.t.store());
-            let [b, c, sum] = finds.weights.map(|weight| weight.store());
             let hit = |lane: usize| {
-                (hits >> lane & 1 == 1).then(|| [t[lane], b[lane] / sum[lane], c[lane] / sum[lane]])
+                let [u, v] = ray.weigh(triangles[lane], true);
+                (hits >> lane & 1 == 1).then_some([t[lane], u, v])
             };
             (std::array::from_fn(hit), finds.open & 0xff)
         }
