@@ -16,7 +16,7 @@
 //! own numbers, so a ray may slip between the two, or hit both.
 
 use super::{Alone, Candidate, Corners, Finds, Lanes3, RENAMED, Test, normal_in_double};
-use crate::simd::{Eight, Lanes, Mask};
+use crate::simd::{Eight, Lanes};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
@@ -206,7 +206,7 @@ impl Alone for Lines<1, f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{Chosen, Isa, Simd, Task};
+    use crate::simd::{Chosen, Isa, Mask, Simd, Task};
     use proptest::prelude::*;
 
     struct Eights<'a>(&'a Lines<1, f32>, &'a [&'a Projected; 8], [f32; 2]);
