@@ -11,6 +11,7 @@
 //! triangle test hold (a fused difference of products can have the wrong sign). [`Lanes::mul_add`]
 //! alone may fuse: it is for bounds.
 
+mod branch;
 mod eight;
 mod isa;
 mod lanes;
@@ -26,6 +27,7 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod pair;
 
+pub use branch::stay_a_branch;
 pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};

@@ -19,7 +19,7 @@ use super::stack::Stack;
 use super::walk::{Heading, Interval, Walk, load3};
 use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::Node;
-use crate::simd::{Lanes, Mask};
+use crate::simd::{Lanes, Mask, stay_a_branch};
 
 /// A subtree that waits for its turn, with the lanes' intervals in it.
 #[derive(Clone, Copy)]
@@ -111,9 +111,12 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
             if enters_first && enters_second {
                 stack.push(Waiting { node: second, interval: second_part });
                 (node, interval) = (first, first_part);
-            } else {
+            } else if enters_first {
                 // Where no lane enters one of the cells, the other's intervals are the parent's.
-                node = if enters_first { first } else { second };
+                stay_a_branch();
+                node = first;
+            } else {
+                node = second;
             }
         }
 

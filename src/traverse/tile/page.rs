@@ -8,7 +8,7 @@ use super::outline::{Block, Window};
 use super::probe::Probe;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Tree;
-use crate::simd::{Mask, Sixteen, prefetch};
+use crate::simd::{Mask, Sixteen, prefetch, stay_a_branch};
 use crate::traverse::stack::Stack;
 use crate::traverse::walk::Interval;
 
@@ -92,6 +92,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
                 let (near_place, far_place) = (below + crossing.near, below + (1 - crossing.near));
                 if in_far == 0 {
                     // Whoever was live still is: the near cell holds all that is left.
+                    stay_a_branch();
                     place = near_place;
                 } else if in_near == 0 {
                     place = far_place;
