@@ -2,7 +2,8 @@
 //!
 //! The upper tree is resident (a hundredth of the data). Nodes, lists of primitives, triangles and what shading asks
 //! about them lie in a file and come in *blocks* when a walk is about to look at them: the kernels say so beforehand
-//! ([`Tree::enter`](crate::kdtree::Tree::enter)), and a [`View`] of the tree sees to it that the blocks are here.
+//! ([`Tree::children`](crate::kdtree::Tree::children), [`Tree::enter_leaf`](crate::kdtree::Tree::enter_leaf)), and a
+//! [`View`] of the tree sees to it that the blocks are here.
 //! For a resident tree that call is empty: the kernels are compiled for each.
 //!
 //! ```text

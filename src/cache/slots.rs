@@ -140,11 +140,6 @@ impl Slots {
         self.place(self.nowhere + 1).wrapping_add(byte)
     }
 
-    /// A place that is no block's, of a block's size.
-    pub fn nowhere(&self) -> *const u8 {
-        self.place(self.nowhere)
-    }
-
     /// Where a block lies, for who has seen that it is here. Of others, what is there means nothing.
     #[inline(always)]
     pub fn at(&self, block: usize) -> *const u8 {
@@ -298,8 +293,8 @@ mod tests {
         put(&slots, 7, 4, 0);
         put(&slots, 1, 5, 0);
         assert_eq!([7, 1, LAST].map(|block| read(&slots, block as usize)), [[4; 2], [5; 2], [3; 2]]);
-        assert_eq!((slots.at(0), slots.at(2)), (slots.nowhere(), slots.nowhere()));
-        assert!([7, 1].iter().all(|&block| slots.nowhere() != slots.at(block)));
+        assert_eq!([slots.at(0), slots.at(2)], [slots.place(slots.nowhere).cast_const(); 2]);
+        assert!([7, 1].iter().all(|&block| slots.place(slots.nowhere).cast_const() != slots.at(block)));
     }
 
     #[test]

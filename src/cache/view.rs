@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 /// A tree whose blocks are fetched before a walk looks at them.
 ///
-/// What it gives out lies in blocks that were here when they were [entered](Tree::enter), and stays there until
+/// What it gives out lies in blocks that were here when they were [entered](Tree::enter_leaf), and stays there until
 /// the next call that enters anything: that one may wait, and the thread leaves its epoch for that.
 #[derive(Debug)]
 pub struct View<'a> {
@@ -31,8 +31,6 @@ pub struct View<'a> {
     /// Of these, shading asks for a few bytes at a time.
     colors: Part<u8>,
     surfaces: Part<u8>,
-    /// The inner node that was entered last, and where its children are.
-    inner: Cell<(Node, *const [Node; 2])>,
     /// Whether all blocks lie in memory as they do in their arrays: see [`Slots`].
     in_order: Cell<bool>,
     shift: u32,
@@ -61,7 +59,6 @@ impl<'a> View<'a> {
             triangles: Part::new(blocks, Array::Triangles),
             colors: Part::new(blocks, Array::Colors),
             surfaces: Part::new(blocks, Array::Surfaces),
-            inner: Cell::new((Node::leaf(0, 0), blocks.slots.nowhere().cast())),
             // In its epoch by now.
             in_order: Cell::new(blocks.slots.are_in_order()),
             shift: blocks.layout.shift(),
@@ -265,7 +262,6 @@ impl<'a> View<'a> {
         let (blocks, local) = (&self.cached.blocks, self.local());
         let start = Instant::now();
         // From here on, what was here may go. Of lists, `known` knows.
-        self.inner.set((Node::leaf(0, 0), self.slots.nowhere().cast()));
         self.nodes.forget();
         self.references.forget();
         self.pages.forget();
@@ -379,13 +375,8 @@ impl Tree for View<'_> {
 
     #[inline(always)]
     fn children(&self, inner: Node) -> [Node; 2] {
-        let (entered, children) = self.inner.get();
-        if entered == inner {
-            // SAFETY: as in `slice`: it was entered, and nothing else since.
-            unsafe { *children }
-        } else {
-            *self.array(&self.nodes, inner.below() as usize)
-        }
+        // SAFETY: as in `slice`.
+        unsafe { *self.enter_elements(&self.nodes, inner.below() as usize) }
     }
 
     #[inline(always)]
@@ -417,13 +408,8 @@ impl Tree for View<'_> {
     }
 
     #[inline(always)]
-    fn enter(&self, node: Node) {
-        if node.is_leaf() {
-            self.enter_list(&self.references, node.references());
-        } else {
-            let children = self.enter_elements(&self.nodes, node.below() as usize);
-            self.inner.set((node, children));
-        }
+    fn enter_leaf(&self, leaf: Node) {
+        self.enter_list(&self.references, leaf.references());
     }
 
     #[inline(always)]

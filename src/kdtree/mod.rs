@@ -48,9 +48,11 @@ pub trait Tree {
     fn bounds(&self) -> &Aabb;
     /// Where every walk begins.
     fn root(&self) -> Node;
-    /// The children of an inner node: below its plane, and above.
+    /// The children of an inner node: below its plane, and above. A tree that is not all in memory gets them now;
+    /// what it has given out before may be gone then.
     fn children(&self, inner: Node) -> [Node; 2];
-    /// The primitive ids of a leaf's triangles, in no order that means anything.
+    /// The primitive ids of a leaf's triangles, in no order that means anything. The leaf has been
+    /// [entered](Self::enter_leaf).
     fn primitives(&self, leaf: Node) -> &[u32];
     /// The node at a place of the upper tree, whose root is at 0: an inner node, whose children's places
     /// are `below()` and the next, or a leaf, which is a page.
@@ -67,10 +69,10 @@ pub trait Tree {
         &self.triangle(primitive).corners
     }
 
-    /// Said before a walk looks at an inner node's children, or at a leaf's triangles. A tree that is not
-    /// all in memory gets them now; what it has given out before may be gone then.
+    /// Said before a walk looks at a leaf's triangles. A tree that is not all in memory gets them now; what it has
+    /// given out before may be gone then.
     #[inline(always)]
-    fn enter(&self, _node: Node) {}
+    fn enter_leaf(&self, _leaf: Node) {}
     /// The same, before a walk looks at a page's triangles.
     #[inline(always)]
     fn enter_page(&self, _leaf: Node) {}

@@ -71,6 +71,13 @@ impl Colors {
 /// The light, 0 to 1, that an sRGB-encoded byte stands for.
 #[inline]
 pub fn srgb_to_linear(byte: u8) -> f32 {
+    linear()[byte as usize]
+}
+
+/// The same for all bytes. To ask whether the table is there yet is more work than to look into it: who decodes several
+/// bytes asks once.
+#[inline]
+fn linear() -> &'static [f32; 256] {
     static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
         std::array::from_fn(|i| {
             let s = i as f64 / 255.0;
@@ -78,7 +85,7 @@ pub fn srgb_to_linear(byte: u8) -> f32 {
             light as f32
         })
     });
-    LINEAR[byte as usize]
+    &LINEAR
 }
 
 /// The sRGB-encoded byte for an amount of light, at most 0.55 of a step away; what lies outside 0 to 1 is clamped,
@@ -91,14 +98,17 @@ pub fn linear_to_srgb(light: f32) -> u8 {
 /// The colour between three corners, blended in linear light as `(1 - u - v) c0 + u c1 + v c2`.
 #[inline]
 pub(crate) fn blend(corners: [[u8; 3]; 3], u: f32, v: f32) -> Vec3 {
-    let [c0, c1, c2] = corners.map(decode);
+    let linear = linear();
+    let [c0, c1, c2] =
+        corners.map(|[r, g, b]| Vec3::new(linear[r as usize], linear[g as usize], linear[b as usize]));
     (1.0 - u - v) * c0 + u * c1 + v * c2
 }
 
 /// An sRGB triple in linear light.
 #[inline]
-pub(crate) fn decode(srgb: [u8; 3]) -> Vec3 {
-    Vec3::from_array(srgb.map(srgb_to_linear))
+pub(crate) fn decode([r, g, b]: [u8; 3]) -> Vec3 {
+    let linear = linear();
+    Vec3::new(linear[r as usize], linear[g as usize], linear[b as usize])
 }
 
 /// Linear light as an sRGB triple.

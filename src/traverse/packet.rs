@@ -89,11 +89,10 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
     loop {
         // Descend to a leaf, leaving farther children on the stack.
         while !node.is_leaf() {
-            tree.enter(node);
             let axis = node.axis();
+            let [below, above] = tree.children(node);
             let wall = walk.crossing(axis, node.split());
             let parts = walk.cut(&interval, &wall);
-            let [below, above] = tree.children(node);
             let (first, second, [first_part, second_part]) = match walk.heading[axis] {
                 Heading::Up => (below, above, parts),
                 Heading::Down => (above, below, parts),
@@ -121,7 +120,7 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
         }
 
         // Test the leaf's triangles against the lanes that are live in it.
-        tree.enter(node);
+        tree.enter_leaf(node);
         let primitives = tree.primitives(node);
         if !primitives.is_empty() {
             let live = interval.live();
