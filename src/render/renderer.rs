@@ -9,12 +9,12 @@ use super::scheduler::{Outcome, Sharing, Workers};
 use super::settings::RenderSettings;
 use super::shade::Shader;
 use super::stats::{FrameStats, RayCount, Tally, quantile};
-use super::tile::{Calls, Scratch, TileTask};
+use super::tile::{Calls, Scratch, TileTask, squares};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Surface};
-use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, RayPacket};
+use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, Places, RayPacket};
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -28,6 +28,8 @@ pub struct Renderer<'a, S = Mesh> {
     tiles: Vec<Tile>,
     /// What workers learnt in the frames before about which kernel is quickest.
     learnt: DispatchPool,
+    /// What squares of the picture cost in the frames before.
+    places: Places,
     /// Frames so far.
     frames: AtomicUsize,
     /// Where the camera goes, if anybody looks ahead.
@@ -66,6 +68,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         settings.check()?;
         let tiles = tiles(settings.size.width, settings.size.height, settings.tuning.tile);
         let learnt = DispatchPool::default();
+        let places = Places::new(squares(settings.size.width) * squares(settings.size.height));
         let (frames, stand_in) = (AtomicUsize::new(0), StandInCost::default());
         Ok(Self {
             accel,
@@ -73,6 +76,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             settings,
             tiles,
             learnt,
+            places,
             frames,
             course: Course::of(accel),
             stand_in,
@@ -230,6 +234,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
             shader: Shader::new(self.surface, wanted.lighting, shadows),
             view,
             samples,
+            places: &self.places,
+            columns: squares(size.width),
             stand_in: None,
         };
         let mut frame = Frame::black(size, aovs);

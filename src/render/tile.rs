@@ -10,13 +10,18 @@ use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
 use crate::scene::{Look, Surface, View};
 use crate::simd::{Simd, Task};
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, RayPacket, Stopwatch};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, Place, Places, RayPacket, Stopwatch};
 use std::time::Instant;
 
 /// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
 /// that reading the clock between stages costs nothing, few enough that their rays and hits stay in the
 /// nearest caches.
 pub(super) const SQUARE: u32 = 16;
+
+/// So many squares lie beside one another over so many pixels.
+pub(super) const fn squares(pixels: u32) -> usize {
+    pixels.div_ceil(SQUARE) as usize
+}
 
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
@@ -25,9 +30,9 @@ const BATCH: usize = (SQUARE * SQUARE) as usize;
 /// use it.
 pub(super) struct Calls<const W: usize> {
     /// The closest hits of the lanes given with each packet.
-    intersect: fn(&mut Dispatch, &Accel, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
+    intersect: fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
     /// Which of those lanes hit anything.
-    occluded: fn(&mut Dispatch, &Accel, &[RayPacket<W>], &[u32], &mut [u32]),
+    occluded: fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [u32]),
 }
 
 impl<const W: usize> Calls<W>
@@ -36,12 +41,12 @@ where
 {
     /// Packet by packet.
     pub const PACKETS: Self = Self {
-        intersect: |_, accel, rays, active, hits| {
+        intersect: |_, accel, _, rays, active, hits| {
             for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
                 *hits = accel.intersect_packet(rays, active);
             }
         },
-        occluded: |_, accel, rays, active, occluded| {
+        occluded: |_, accel, _, rays, active, occluded| {
             for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
                 *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
             }
@@ -52,7 +57,7 @@ where
 impl Calls<1> {
     /// All rays of a square in one stream.
     pub const STREAM: Self = Self {
-        intersect: |_, accel, rays, active, hits| {
+        intersect: |_, accel, _, rays, active, hits| {
             let mut found = [Hit::MISS; BATCH];
             let found = &mut found[..rays.len()];
             accel.intersect_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
@@ -60,7 +65,7 @@ impl Calls<1> {
                 *packet = HitPacket::of_hit(hit);
             }
         },
-        occluded: |_, accel, rays, active, occluded| {
+        occluded: |_, accel, _, rays, active, occluded| {
             let mut found = [false; BATCH];
             let found = &mut found[..rays.len()];
             accel.occluded_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
@@ -94,6 +99,10 @@ pub(super) struct TileTask<'a, S, const W: usize> {
     pub shader: Shader<'a, S>,
     pub view: View,
     pub samples: u32,
+    /// What squares have cost before, by their numbers.
+    pub places: &'a Places,
+    /// Squares beside one another in the picture.
+    pub columns: usize,
     /// What is drawn where blocks do not come in time, if time is limited.
     pub stand_in: Option<StandIn<'a>>,
 }
@@ -218,19 +227,29 @@ where
     /// Renders the square of a tile at a place in it.
     fn square(&self, scratch: &mut Scratch<W>, pixels: &mut TilePixels<'_>, (x, y): (u32, u32)) {
         let used = scratch.cover(&pixels.tile, x, y);
+        // Where squares of tiles do not lie on the grid of the picture, two may have one number.
+        let [column, row] = [pixels.tile.x + x, pixels.tile.y + y].map(|place| (place / SQUARE) as usize);
+        let place = self.places.at(row * self.columns + column);
         for sample in 0..self.samples {
-            self.sample(scratch, used, sample, pixels);
+            self.sample(scratch, used, sample, place, pixels);
         }
         self.write(scratch, used, pixels);
     }
 
     /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
-    fn sample(&self, scratch: &mut Scratch<W>, used: usize, sample: u32, pixels: &mut TilePixels<'_>) {
+    fn sample(
+        &self,
+        scratch: &mut Scratch<W>,
+        used: usize,
+        sample: u32,
+        place: Place<'_>,
+        pixels: &mut TilePixels<'_>,
+    ) {
         let start = Stopwatch::start(self.accel);
         let active = &scratch.active[..used];
         self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
         let (rays, hits) = (&scratch.rays[..used], &mut scratch.hits[..used]);
-        (self.calls.intersect)(&mut scratch.dispatch, self.accel, rays, active, hits);
+        (self.calls.intersect)(&mut scratch.dispatch, self.accel, place, rays, active, hits);
         scratch.camera.rays += count(active);
         scratch.camera.time += start.elapsed(self.accel);
 
@@ -243,7 +262,7 @@ where
         let start = Stopwatch::start(self.accel);
         let lit = &scratch.lit[..used];
         let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
-        (self.calls.occluded)(&mut scratch.dispatch, self.accel, rays, lit, occluded);
+        (self.calls.occluded)(&mut scratch.dispatch, self.accel, place, rays, lit, occluded);
         self.accel.chosen().run(AddKey { shades: &mut scratch.shades[..used], lit, occluded });
         scratch.shadow.rays += count(lit);
         scratch.shadow.time += start.elapsed(self.accel);

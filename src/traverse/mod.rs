@@ -31,7 +31,7 @@ mod width;
 pub use accel::Accel;
 pub(crate) use ahead::look_ahead;
 pub use coarse::{Entry, first_page};
-pub use dispatch::{Dispatch, DispatchPool, SliceDispatch};
+pub use dispatch::{Dispatch, DispatchPool, Place, Places, SliceDispatch};
 pub use kernel::Kernel;
 pub use lanes::{HitPacket, RayPacket};
 pub use sieve::Sieve;

@@ -6,7 +6,7 @@ use super::path::Way;
 use crate::geometry::{Hit, Ray};
 use crate::scene::Surface;
 use crate::scene::effects::Effect;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket};
 
 /// Rays that go to a kernel at once: sixteen packets of sixteen.
 const LOT: usize = 256;
@@ -80,7 +80,13 @@ impl Tracer {
                     let packets = &mut self.packets;
                     let count = packets.fill(rays);
                     let found = &mut packets.hits[..count];
-                    dispatch.intersect(accel, &packets.rays[..count], &packets.active[..count], found);
+                    dispatch.intersect(
+                        accel,
+                        Place::NONE,
+                        &packets.rays[..count],
+                        &packets.active[..count],
+                        found,
+                    );
                     for (i, hit) in hits.iter_mut().enumerate() {
                         *hit = found[i / 16].get(i % 16);
                     }
@@ -113,7 +119,13 @@ impl Tracer {
                 let packets = &mut self.packets;
                 let count = packets.fill(rays);
                 let lanes = &mut packets.occluded[..count];
-                dispatch.occluded(accel, &packets.rays[..count], &packets.active[..count], lanes);
+                dispatch.occluded(
+                    accel,
+                    Place::NONE,
+                    &packets.rays[..count],
+                    &packets.active[..count],
+                    lanes,
+                );
                 for (i, found) in found.iter_mut().enumerate() {
                     *found = lanes[i / 16] >> (i % 16) & 1 == 1;
                 }

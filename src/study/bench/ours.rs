@@ -13,7 +13,8 @@ use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
 use crate::traverse::{
-    Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
+    Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, Place, RayPacket, SliceDispatch,
+    TileCounts,
 };
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -116,21 +117,22 @@ impl Ours {
     }
 
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
-    /// chunk, and taken up by whoever comes next: mostly the same worker.
+    /// chunk, and taken up by whoever comes next: mostly the same worker. No place is remembered from round to
+    /// round: in a picture that is new they would be new, too.
     fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
         let learnt = Arc::new(DispatchPool::<Dispatch>::default());
         let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             let mut dispatch = shared.take();
             for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
-                dispatch.intersect(accel, packets, lanes, out);
+                dispatch.intersect(accel, Place::NONE, packets, lanes, out);
             }
             shared.put(dispatch);
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
             let mut dispatch = learnt.take();
             for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
-                dispatch.occluded(accel, packets, lanes, out);
+                dispatch.occluded(accel, Place::NONE, packets, lanes, out);
             }
             learnt.put(dispatch);
         };

@@ -15,6 +15,11 @@
 //! and what believed the first two lots of each way once took 76 % longer for a whole picture.
 //!
 //! The quickest way is taken, and the others are tried now and then: the seldomer, the slower they are.
+//!
+//! **Places that were seen before** ([`places`](super::places)) have figures of their own. There the way is taken that was
+//! quickest at that very place, as far as a few visits tell; one that was not tried there yet is expected to be to the others
+//! as it is elsewhere in such a kind of place. What such lots cost teaches nothing about ways elsewhere: each was taken
+//! where it is good.
 
 use std::time::Duration;
 
@@ -29,6 +34,8 @@ pub struct Choice<const WAYS: usize> {
     usual: f32,
     /// Lots so far.
     lots: u32,
+    /// Whether the next lot's way was chosen by what is known of its place.
+    by_place: bool,
 }
 
 /// What is known of one kind of place.
@@ -71,21 +78,35 @@ const MOST_WAIT: f32 = 800.0;
 /// The number of lots after a trial that did better than the quickest way is known to.
 const WAIT_AFTER_SURPRISE: f32 = 4.0;
 
+/// At a place that is known: one in how many visits tries a way again that is as quick as the quickest, one that was never
+/// tried there, and how many more visits it is for each time that a way is slower, squared.
+const VISITS: f32 = 32.0;
+const VISITS_UNTRIED: f32 = 8.0;
+const VISITS_IF_SLOWER: f32 = 5.0;
+
+/// One in how many visits takes no heed of the place, so that what is known of ways elsewhere does not grow old.
+const VISITS_AS_ELSEWHERE: u32 = 16;
+
+/// How much of what sets a way apart at a place is believed: the rest is what it is elsewhere. One figure of one visit may
+/// be of a cold cache, or of a view that was a little different.
+const BELIEF: f32 = 0.5;
+
 impl<const WAYS: usize> Default for Choice<WAYS> {
     fn default() -> Self {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
-        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, usual: 0.0, lots: 0 }
+        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, usual: 0.0, lots: 0, by_place: false }
     }
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
+        self.by_place = false;
         if self.is_beginning() {
             let place = self.lots as usize % (2 * WAYS);
             return if place < WAYS { place } else { 2 * WAYS - 1 - place };
         }
-        self.meet();
+        self.meet(self.here);
         let kind = &mut self.kinds[self.here];
         kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
         let quickest = kind.quickest();
@@ -97,17 +118,55 @@ impl<const WAYS: usize> Choice<WAYS> {
         self.lots < 2 * FIRST * WAYS as u32
     }
 
+    /// The way for the next lot, of whose place is known what some ways cost there before: see [`Costs::known`].
+    ///
+    /// [`Costs::known`]: super::places::Costs::known
+    pub fn next_at(&mut self, known: &[Option<f32>; WAYS]) -> usize {
+        let Some(least) = known.iter().flatten().copied().reduce(f32::min) else { return self.next() };
+        let dice = self.dice();
+        if self.is_beginning() || dice.is_multiple_of(VISITS_AS_ELSEWHERE) {
+            return self.next();
+        }
+        self.by_place = true;
+        let kind = self.kind_at(least);
+        self.meet(kind);
+        let costs = expected(known, &self.kinds[kind].cost);
+        let best = smallest(&costs);
+        for way in (0..WAYS).filter(|&way| way != best) {
+            let visits = if known[way].is_some() { VISITS } else { VISITS_UNTRIED };
+            let slower = (2.0 * (costs[way] - costs[best])).exp2() - 1.0;
+            let dice = dice.rotate_left(8 + 8 * way as u32).wrapping_mul(0x85eb_ca6b);
+            if (dice >> 8) as f32 * (visits * (1.0 + VISITS_IF_SLOWER * slower)) < (1 << 24) as f32 {
+                return way;
+            }
+        }
+        best
+    }
+
+    /// A number that has nothing to do with the one for the lot before.
+    fn dice(&self) -> u32 {
+        let mixed = self.lots.wrapping_mul(0x9e37_79b9);
+        (mixed ^ mixed >> 15).wrapping_mul(0x2c1b_3c6d) >> 3
+    }
+
+    /// The kind of place where a lot costs so much.
+    fn kind_at(&self, cost: f32) -> usize {
+        // What is usual is in the middle of the middle kind.
+        let place = (cost - self.usual) / WIDTH + KINDS as f32 * 0.5;
+        (place.max(0.0) as usize).min(KINDS - 1)
+    }
+
     /// In a kind of place that is new, begins with what the nearest known one has taught.
-    fn meet(&mut self) {
-        if self.kinds[self.here].taken != [0; WAYS] {
+    fn meet(&mut self, new: usize) {
+        if self.kinds[new].taken != [0; WAYS] {
             return;
         }
         let known = |&kind: &usize| self.kinds[kind].taken != [0; WAYS];
-        let Some(nearest) = (0..KINDS).filter(known).min_by_key(|kind| kind.abs_diff(self.here)) else {
+        let Some(nearest) = (0..KINDS).filter(known).min_by_key(|kind| kind.abs_diff(new)) else {
             return;
         };
         let Kind { cost, .. } = self.kinds[nearest];
-        let kind = &mut self.kinds[self.here];
+        let kind = &mut self.kinds[new];
         *kind = Kind { cost, taken: [1; WAYS], wait: [0.0; WAYS] };
         kind.wait = std::array::from_fn(|way| kind.wait_of(way));
     }
@@ -117,13 +176,29 @@ impl<const WAYS: usize> Choice<WAYS> {
         self.kinds[self.here].quickest()
     }
 
-    /// Says what the lot cost for which `way` was taken.
-    pub fn record(&mut self, way: usize, rays: u64, time: Duration) {
+    /// Says what the lot cost for which `way` was taken. Gives the logarithm (base 2) of the nanoseconds a ray; nothing
+    /// if there were no rays.
+    pub fn record(&mut self, way: usize, rays: u64, time: Duration) -> Option<f32> {
         if rays == 0 {
-            return;
+            return None;
         }
         // Clocks may stand still over a short lot.
         let new = ((time.as_nanos() as f32).max(1.0) / rays as f32).log2();
+        if !self.by_place {
+            self.learn(way, new);
+        }
+        self.lots = self.lots.saturating_add(1);
+        self.usual += WEIGHT_OF_USUAL.max(1.0 / self.lots as f32) * (new - self.usual);
+        self.last = new;
+        // All ways are tried in one kind of place, before others are told from it.
+        if !self.is_beginning() {
+            self.here = self.kind_at(new);
+        }
+        Some(new)
+    }
+
+    /// Learns from what a lot cost.
+    fn learn(&mut self, way: usize, new: f32) {
         let before = if self.lots == 0 { new } else { self.last };
         let kind = &mut self.kinds[self.here];
         let quickest = kind.quickest();
@@ -133,17 +208,6 @@ impl<const WAYS: usize> Choice<WAYS> {
         let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };
         kind.cost[way] += weight.max(1.0 / kind.taken[way] as f32) * (cost - kind.cost[way]);
         kind.wait[way] = if surprise { WAIT_AFTER_SURPRISE } else { kind.wait_of(way) };
-
-        self.lots = self.lots.saturating_add(1);
-        self.usual += WEIGHT_OF_USUAL.max(1.0 / self.lots as f32) * (new - self.usual);
-        self.last = new;
-        // All ways are tried in one kind of place, before others are told from it.
-        if self.is_beginning() {
-            return;
-        }
-        // What is usual is in the middle of the middle kind.
-        let place = (new - self.usual) / WIDTH + KINDS as f32 * 0.5;
-        self.here = (place.max(0.0) as usize).min(KINDS - 1);
     }
 }
 
@@ -160,8 +224,26 @@ impl<const WAYS: usize> Kind<WAYS> {
     }
 }
 
+/// What each way is expected to cost at a place where some of them, at least one, are known to, if they cost `elsewhere`,
+/// relative to one another, in such places.
+fn expected<const WAYS: usize>(known: &[Option<f32>; WAYS], elsewhere: &[f32; WAYS]) -> [f32; WAYS] {
+    // How dear the place is, whichever way is taken.
+    let here = || known.iter().zip(elsewhere).filter_map(|(known, elsewhere)| Some((*known)? - elsewhere));
+    let dear = here().sum::<f32>() / here().count() as f32;
+    std::array::from_fn(|way| {
+        let usual = dear + elsewhere[way];
+        known[way].map_or(usual, |known| usual + BELIEF * (known - usual))
+    })
+}
+
+/// The place of the smallest figure.
+fn smallest<const WAYS: usize>(costs: &[f32; WAYS]) -> usize {
+    (0..WAYS).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::places::Places;
     use super::*;
 
     /// Traces lots of 256 rays, `cost(lot, way)` giving the nanoseconds a ray; how often each way was
@@ -245,9 +327,50 @@ mod tests {
     }
 
     #[test]
+    fn places_have_ways_of_their_own() {
+        // Which of three ways is quickest hangs on the place, and on nothing that the lot before tells.
+        let quickest = |place: u32| (place.wrapping_mul(0x9e37_79b9) >> 16) as usize % 3;
+        let cost =
+            |place: u32, way: usize| if way == quickest(place) { 30.0 } else { 50.0 + 30.0 * way as f64 };
+        let (mut choice, places) = (Choice::<3>::default(), Places::<3>::new(400));
+        let mut frame = |_| {
+            let mut total = 0.0;
+            for place in 0..400 {
+                let costs = places.at(place).closest.expect("it is there");
+                let way = choice.next_at(&costs.known());
+                let cost = cost(place as u32, way);
+                total += cost;
+                let cost = choice.record(way, 256, Duration::from_nanos((256.0 * cost) as u64));
+                costs.record(way, cost.expect("there were rays"));
+            }
+            total / 400.0
+        };
+        let first: f64 = frame(0);
+        let last = (1..200).map(&mut frame).last().expect("there were frames");
+        let best_single = (0..3)
+            .map(|way| (0..400).map(|place| cost(place, way)).sum::<f64>() / 400.0)
+            .fold(f64::INFINITY, f64::min);
+        assert!(first > 45.0, "{first}: nothing tells beforehand");
+        assert!(last < 33.0 && last < 0.7 * best_single, "{last} beside {best_single}");
+    }
+
+    #[test]
+    fn what_is_slow_at_a_place_is_hardly_ever_tried_there() {
+        let mut choice = Choice::<2>::default();
+        run(&mut choice, 100, |_| [30.0, 240.0]);
+        let tried = (0..10_000).filter(|_| {
+            let way = choice.next_at(&[Some(5.0), Some(8.0)]);
+            choice.record(way, 256, Duration::from_nanos([256 * 32, 256 * 256][way]));
+            way == 1
+        });
+        let tried = tried.count();
+        assert!((1..40).contains(&tried), "{tried}");
+    }
+
+    #[test]
     fn nothing_is_learnt_from_no_rays() {
         let mut choice = Choice::<2>::default();
-        choice.record(0, 0, Duration::from_secs(1));
+        assert_eq!(choice.record(0, 0, Duration::from_secs(1)), None);
         assert_eq!(choice.next(), 0);
     }
 }

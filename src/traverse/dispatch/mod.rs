@@ -4,21 +4,28 @@
 //! smaller, packet by packet; and where each ray of a packet meets triangles of its own, in smaller
 //! packets. Pictures hold all of that. How quick a kernel is hangs on the model, the view, the machine and
 //! its instruction set, and nothing that could be known beforehand tells it as well as having tried: so a
-//! [`Dispatch`] times what it does, square by square, and does what was quickest nearby. Only time hangs
-//! on the choice: hits are the same, bit for bit.
+//! [`Dispatch`] times what it does, square by square, and does what was quickest nearby, or, in a picture that is not the
+//! first of its kind, at that [place](Places). Only time hangs on the choice: hits are the same, bit for bit.
 
 mod choice;
+mod places;
 mod pool;
 mod slices;
 
 pub use pool::DispatchPool;
 pub use slices::SliceDispatch;
 
+/// What squares of a picture have cost, for [`Dispatch`].
+pub type Places = places::Places<{ WAYS.len() }>;
+/// One of [`Places`].
+pub type Place<'a> = places::Place<'a, { WAYS.len() }>;
+
 use super::accel::Accel;
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
 use super::stopwatch::Stopwatch;
 use choice::Choice;
+use places::Costs;
 
 /// The kernels that it chooses among.
 const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
@@ -42,15 +49,16 @@ pub struct Dispatch {
 }
 
 impl Dispatch {
-    /// As [`Accel::intersect_tile`], by the kernel that is quickest.
+    /// As [`Accel::intersect_tile`], by the kernel that is quickest at a place.
     pub fn intersect(
         &mut self,
         accel: &Accel,
+        place: Place<'_>,
         rays: &[RayPacket<16>],
         active: &[u32],
         hits: &mut [HitPacket<16>],
     ) {
-        timed(accel, &WAYS, &mut self.closest, count(active), |kernel| match kernel {
+        timed(accel, &WAYS, &mut self.closest, place.closest, count(active), |kernel| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => {
                 for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
@@ -65,9 +73,16 @@ impl Dispatch {
         });
     }
 
-    /// As [`Accel::occluded_tile`], by the kernel that is quickest.
-    pub fn occluded(&mut self, accel: &Accel, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
-        timed(accel, &WAYS, &mut self.any, count(active), |kernel| match kernel {
+    /// As [`Accel::occluded_tile`], by the kernel that is quickest at a place.
+    pub fn occluded(
+        &mut self,
+        accel: &Accel,
+        place: Place<'_>,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        occluded: &mut [u32],
+    ) {
+        timed(accel, &WAYS, &mut self.any, place.any, count(active), |kernel| match kernel {
             Kernel::Tile => accel.occluded_tile(rays, active, occluded),
             Kernel::Packet8 => {
                 for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
@@ -88,12 +103,13 @@ impl Dispatch {
     }
 }
 
-/// Has a kernel trace so many rays, and takes note of how long that took.
+/// Has a kernel trace so many rays of a place, and takes note of how long that took.
 #[inline(always)]
 fn timed<const N: usize>(
     accel: &Accel,
     ways: &[Kernel; N],
     choice: &mut Choice<N>,
+    place: Option<&Costs<N>>,
     rays: usize,
     trace: impl FnOnce(Kernel),
 ) -> usize {
@@ -106,10 +122,16 @@ fn timed<const N: usize>(
         trace(ways[way]);
         return way;
     }
-    let way = choice.next();
+    let way = match place {
+        Some(costs) => choice.next_at(&costs.known()),
+        None => choice.next(),
+    };
     let start = Stopwatch::start(accel);
     trace(ways[way]);
-    choice.record(way, rays as u64, start.elapsed(accel));
+    let cost = choice.record(way, rays as u64, start.elapsed(accel));
+    if let (Some(costs), Some(cost)) = (place, cost) {
+        costs.record(way, cost);
+    }
     way
 }
 

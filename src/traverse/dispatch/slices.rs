@@ -28,7 +28,7 @@ impl SliceDispatch {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         for (rays, hits) in rays.chunks(LOT).zip(hits.chunks_mut(LOT)) {
             let trace = |kernel| accel.intersect_many(kernel, rays, hits);
-            let way = timed(accel, &WAYS, &mut self.closest, rays.len(), trace);
+            let way = timed(accel, &WAYS, &mut self.closest, None, rays.len(), trace);
             self.traced[way] += rays.len() as u64;
         }
     }
@@ -38,7 +38,7 @@ impl SliceDispatch {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         for (rays, occluded) in rays.chunks(LOT).zip(occluded.chunks_mut(LOT)) {
             let trace = |kernel| accel.occluded_many(kernel, rays, occluded);
-            let way = timed(accel, &WAYS, &mut self.any, rays.len(), trace);
+            let way = timed(accel, &WAYS, &mut self.any, None, rays.len(), trace);
             self.traced[way] += rays.len() as u64;
         }
     }
