@@ -35,6 +35,10 @@ const READERS: usize = 4096;
 /// at 0.83, with this at 0.87. With 1024, LRU read a third more blocks (power plant outside, 16 % in memory).
 const SESSIONS_PER_TICK: u32 = 64;
 
+/// One in so many of all blocks that may be here moves before a frame, at most: so that all have after some frames, and
+/// none takes much longer for it.
+const MOVES: usize = 8;
+
 /// What stands for the tick of the frame where there is none: then ticks go on with squares.
 const BY_SQUARES: u32 = u32::MAX;
 
@@ -152,7 +156,31 @@ impl Blocks {
         self.sessions.store(tick * SESSIONS_PER_TICK, Ordering::Relaxed);
         let is_calm = self.gone.swap(0, Ordering::Relaxed) == 0;
         self.frame_tick.store(if is_calm { tick } else { BY_SQUARES }, Ordering::Relaxed);
+        if was_short {
+            self.move_in();
+        }
         was_short
+    }
+
+    /// Moves some blocks from their [homes](Slots) to slots; how many.
+    pub fn move_in(&self) -> usize {
+        let most = (self.limit / MOVES).max(1);
+        let mut done = 0;
+        while done < most {
+            let count = self.take_rooms(most - done);
+            let mut retired = self.retired();
+            // SAFETY: blocks are given back by who has the lock of the list.
+            let moved = unsafe { self.slots.move_in(count, || self.epochs.earliest()) };
+            self.committed.fetch_sub(count - moved.len(), Ordering::AcqRel);
+            if moved.is_empty() {
+                break;
+            }
+            done += moved.len();
+            retired.push_homes(self.epochs.retire(), moved);
+            drop(retired);
+            self.reclaim();
+        }
+        done
     }
 
     /// From now on, writes uses down, or no longer does. Where nothing ever has to go, it is enough to know which blocks
@@ -308,12 +336,20 @@ impl Blocks {
     fn reclaim(&self) -> bool {
         let mut retired = self.retired();
         let earliest = self.epochs.earliest();
+        let mut freed = 0;
+        // Before blocks: no block that has moved since is away before its home is.
+        while let Some(homes) = retired.take_homes_before(earliest) {
+            // SAFETY: their blocks had moved before all epochs that a reader may be in.
+            unsafe { self.slots.leave_homes(&homes) };
+            freed += homes.len();
+        }
         let free = retired.take_before(earliest);
         // SAFETY: they were declared gone before all epochs that a reader may be in, and they can only come back by being
         // taken out of the list, whose lock is held.
         unsafe { self.slots.give_back(&free) };
-        self.committed.fetch_sub(free.len(), Ordering::AcqRel);
-        !free.is_empty()
+        freed += free.len();
+        self.committed.fetch_sub(freed, Ordering::AcqRel);
+        freed > 0
     }
 
     /// Waits until there is memory for one more block, and takes it.
@@ -331,6 +367,17 @@ impl Blocks {
                 self.shrink();
             }
         }
+    }
+
+    /// Takes memory for up to `most` blocks more, as many as there is at once; for how many.
+    fn take_rooms(&self, most: usize) -> usize {
+        let mut taken = 0;
+        let _ = self.committed.fetch_update(Ordering::AcqRel, Ordering::Acquire, |committed| {
+            taken = (self.limit - committed).min(most);
+            Some(committed + taken)
+        });
+        self.most_committed.fetch_max(self.committed.load(Ordering::Relaxed), Ordering::Relaxed);
+        taken
     }
 
     /// Takes memory for one more block, if there is some or nobody reads any more what has some.

@@ -9,6 +9,8 @@ pub struct Retired {
     queue: VecDeque<(u64, u32)>,
     /// By block: the epoch that it was retired at, if it was and is not kept.
     at: HashMap<u32, u64>,
+    /// Homes that blocks have moved away from, likewise: in lots, each in ascending order.
+    homes: VecDeque<(u64, Vec<u32>)>,
 }
 
 impl Retired {
@@ -42,6 +44,17 @@ impl Retired {
         }
         taken
     }
+
+    /// Blocks have moved away from their homes.
+    pub fn push_homes(&mut self, epoch: u64, blocks: Vec<u32>) {
+        self.homes.push_back((epoch, blocks));
+    }
+
+    /// Takes out a lot of those that did so before an epoch.
+    pub fn take_homes_before(&mut self, epoch: u64) -> Option<Vec<u32>> {
+        self.homes.front().filter(|(moved, _)| *moved < epoch)?;
+        self.homes.pop_front().map(|(_, blocks)| blocks)
+    }
 }
 
 #[cfg(test)]
@@ -61,6 +74,18 @@ mod tests {
         assert_eq!(retired.take_before(6), [71], "72 was given up later, the second time");
         assert_eq!(retired.take_before(7), [72]);
         assert!(!retired.keep(70) && retired.queue.is_empty() && retired.at.is_empty());
+    }
+
+    #[test]
+    fn homes_are_left_in_the_order_of_moving() {
+        let mut retired = Retired::default();
+        retired.push_homes(3, vec![7, 8]);
+        retired.push_homes(4, vec![9]);
+        assert_eq!(retired.take_homes_before(3), None);
+        assert_eq!(retired.take_homes_before(5), Some(vec![7, 8]));
+        assert_eq!(retired.take_homes_before(4), None);
+        assert_eq!(retired.take_homes_before(5), Some(vec![9]));
+        assert_eq!(retired.take_homes_before(5), None);
     }
 
     #[test]

@@ -17,7 +17,8 @@
 //!
 //! Homes alone cost a page fault for each block that comes, and a page to give back for each that goes: 3 and 1 of some 10
 //! microseconds (AMD EPYC 9004, a virtual machine, Linux 6.18). Slots alone make walks 1.05 to 1.1 times as long where all
-//! that is needed is here.
+//! that is needed is here. Where much has to go, blocks that stayed at home [move](Slots::move_in) to slots: large pages
+//! make walks shorter, and a block that goes leaves a slot and not a page.
 //!
 //! **Who may take homes for granted.** A reader that has entered an [epoch](super::epoch) and then sees that blocks are in
 //! order may do without the table until it leaves: no block comes to a slot before all readers have left that
@@ -65,6 +66,19 @@ struct State {
     next: u32,
     /// The epoch in which the order was given up, unless all readers have left that one.
     left_at: Option<u64>,
+    /// Blocks before this one have moved to slots, if they were at home.
+    moved: u32,
+}
+
+impl State {
+    /// A slot that is free, of those before `nowhere`.
+    fn slot(&mut self, nowhere: u32) -> u32 {
+        self.back.pop().unwrap_or_else(|| {
+            assert!(self.next < nowhere, "no more blocks come than there are slots for");
+            self.next += 1;
+            self.next - 1
+        })
+    }
 }
 
 /// A large page of most machines.
@@ -113,7 +127,7 @@ impl Slots {
             }
         }
         let nowhere = slots as u32;
-        let state = State { used: 0, back: Vec::new(), next: 0, left_at: None };
+        let state = State { used: 0, back: Vec::new(), next: 0, left_at: None, moved: 0 };
         Ok(Self {
             map,
             of: (0..blocks).map(|_| AtomicU32::new(nowhere)).collect(),
@@ -143,8 +157,8 @@ impl Slots {
     /// Where a block lies, for who has seen that it is here. Of others, what is there means nothing.
     #[inline(always)]
     pub fn at(&self, block: usize) -> *const u8 {
-        // Whoever saw that the block is here has synchronized with who brought it.
-        self.place(self.of[block].load(Ordering::Relaxed))
+        // Whoever saw that the block is here has synchronized with who brought it; but not with who has moved it since.
+        self.place(self.of[block].load(Ordering::Acquire))
     }
 
     /// The first byte of a place.
@@ -174,23 +188,65 @@ impl Slots {
         let place = self.take(block, earliest);
         // SAFETY: it lies inside of the mapping, and nobody reads or writes it: it is the block's alone, or was free.
         unsafe { self.place(place).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
-        of.store(place, Ordering::Relaxed);
+        of.store(place, Ordering::Release);
     }
 
     fn take(&self, block: u32, earliest: impl FnOnce() -> u64) -> u32 {
         let mut state = self.state();
         state.used += 1;
-        // A reader may still be there that was when the order was given up, and knows nothing of it.
-        let is_relied_on = self.are_in_order() || state.left_at.is_some_and(|left| earliest() <= left);
-        if is_relied_on {
+        if self.is_relied_on(&mut state, earliest) {
             return self.nowhere + 1 + block;
         }
-        state.left_at = None;
-        state.back.pop().unwrap_or_else(|| {
-            assert!(state.next < self.nowhere, "no more blocks come than there are slots for");
-            state.next += 1;
-            state.next - 1
-        })
+        state.slot(self.nowhere)
+    }
+
+    /// Whether somebody may look for blocks at their homes without looking at the table.
+    fn is_relied_on(&self, state: &mut State, earliest: impl FnOnce() -> u64) -> bool {
+        // A reader may still be there that was when the order was given up, and knows nothing of it.
+        let is_relied_on = self.are_in_order() || state.left_at.is_some_and(|left| earliest() <= left);
+        if !is_relied_on {
+            state.left_at = None;
+        }
+        is_relied_on
+    }
+
+    /// Moves up to `most` blocks from their homes to slots, if nobody relies on the order any more, and says which. Their
+    /// homes are as they were, for who has looked the blocks up already, until [left](Self::leave_homes).
+    ///
+    /// # Safety
+    /// Meanwhile nobody [gives back](Self::give_back) any block.
+    pub unsafe fn move_in(&self, most: usize, earliest: impl FnOnce() -> u64) -> Vec<u32> {
+        let (mut state, mut moved) = (self.state(), Vec::new());
+        if self.homes != Homes::AtFirst || self.is_relied_on(&mut state, earliest) {
+            return moved;
+        }
+        while moved.len() < most && (state.moved as usize) < self.of.len() {
+            let block = state.moved;
+            state.moved += 1;
+            let of = &self.of[block as usize];
+            let home = of.load(Ordering::Acquire);
+            if home > self.nowhere {
+                let slot = state.slot(self.nowhere);
+                // SAFETY: both lie inside of the mapping, which knows no overlaps; the slot is nobody else's, and nobody
+                // writes to a block that is here.
+                unsafe { self.place(slot).copy_from_nonoverlapping(self.place(home), 1 << self.shift) };
+                of.store(slot, Ordering::Release);
+                moved.push(block);
+            }
+        }
+        moved
+    }
+
+    /// Gives the memory of homes back whose blocks have moved. They are in ascending order.
+    ///
+    /// # Safety
+    /// Nobody has a reference into them.
+    pub unsafe fn leave_homes(&self, blocks: &[u32]) {
+        for run in blocks.chunk_by(|&block, &next| block + 1 == next) {
+            let home = (self.nowhere + 1 + run[0]) as usize;
+            // SAFETY: nobody has a reference into it.
+            unsafe { self.empty(home << self.shift, run.len() << self.shift) };
+        }
     }
 
     /// Gives up the order, where there is one and it is not for ever. To be called before a block is retired; `retire`
@@ -235,7 +291,7 @@ impl Slots {
         if state.used == 0 && self.homes == Homes::AtFirst {
             // SAFETY: there are no blocks to have references into.
             unsafe { self.empty(0, (self.nowhere as usize) << self.shift) };
-            *state = State { used: 0, back: Vec::new(), next: 0, left_at: None };
+            *state = State { used: 0, back: Vec::new(), next: 0, left_at: None, moved: 0 };
             self.in_order.store(true, Ordering::SeqCst);
         }
     }
@@ -334,6 +390,45 @@ mod tests {
         put(&slots, 70, 2, 0);
         assert!(slots.are_in_order() && is_at_home(&slots, 70) && read(&slots, 70) == [2; 2]);
         assert_eq!(read(&slots, 71), [0; 2]);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn blocks_move_when_nobody_relies_on_the_order_any_more() {
+        // SAFETY: nobody gives anything back meanwhile.
+        let move_in = |slots: &Slots, most, earliest| unsafe { slots.move_in(most, || earliest) };
+        let slots = Slots::new(100, 6, 16).expect("addresses are free");
+        [3, 4, 5, 90].into_iter().for_each(|block| put(&slots, block, block as u8, 0));
+        assert!(move_in(&slots, 10, 9).is_empty(), "they are in order");
+        slots.leave_order(|| 5);
+        assert!(move_in(&slots, 10, 5).is_empty(), "somebody may not know yet");
+        let homes = [3, 4, 5, 90].map(|block| slots.at(block));
+        assert_eq!(move_in(&slots, 2, 6), [3, 4]);
+        put(&slots, 50, 50, 6);
+        assert_eq!(
+            [3, 4, 5, 50, 90].map(|block| is_at_home(&slots, block)),
+            [false, false, true, false, true]
+        );
+        assert_eq!(
+            [3, 4, 5, 50, 90].map(|block| read(&slots, block)),
+            [[3; 2], [4; 2], [5; 2], [50; 2], [90; 2]]
+        );
+        // SAFETY: homes have memory behind them for who has not left yet.
+        assert_eq!(homes.map(|home| unsafe { *home }), [3, 4, 5, 90]);
+        // SAFETY: nobody has a reference.
+        unsafe { slots.leave_homes(&[3, 4]) };
+        // SAFETY: as before.
+        assert_eq!(homes.map(|home| unsafe { *home }), [0, 0, 5, 90]);
+        assert_eq!(move_in(&slots, 10, 6), [5, 90]);
+        assert!(move_in(&slots, 10, 6).is_empty(), "all have moved");
+        // SAFETY: nobody has a reference.
+        unsafe { slots.leave_homes(&[5, 90]) };
+        give_back(&slots, &[3, 4, 5, 50, 90]);
+        slots.begin_anew();
+        put(&slots, 90, 1, 0);
+        assert!(is_at_home(&slots, 90) && read(&slots, 90) == [1; 2]);
+        slots.leave_order(|| 7);
+        assert_eq!(move_in(&slots, 10, 8), [90], "the table is gone through anew");
     }
 
     #[test]

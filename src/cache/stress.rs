@@ -77,6 +77,10 @@ fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
                         blocks.clear();
                         blocks.begin_frame();
                     }
+                    if random(20) == 0 {
+                        // What is still at home moves.
+                        blocks.begin_frame();
+                    }
                     let Ok(gathered) = blocks.gather(loaders, &wanted, || ()) else {
                         late.fetch_add(1, Ordering::Relaxed);
                         continue;

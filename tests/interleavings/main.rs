@@ -72,10 +72,11 @@ use std::env;
 use std::time::Instant;
 
 /// What is tried, and in how many schedules.
-const CHECKS: [(&str, fn(), usize); 15] = [
+const CHECKS: [(&str, fn(), usize); 16] = [
     ("blocks are whole for as long as they are read", scenes::blocks_are_whole, 1500),
     ("the same in sets of one block", scenes::sets_of_one, 1500),
     ("a block may be asked for while it goes", scenes::asked_for_again, 6000),
+    ("blocks move while they are read", scenes::blocks_move, 3000),
     ("nobody waits for ever for a block that failed", scenes::a_failure_ends, 1500),
     ("a deadline leaves nothing behind", scenes::a_deadline, 6000),
     ("a block may be needed while it comes ahead of need", scenes::ahead_of_need, 1500),

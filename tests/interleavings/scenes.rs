@@ -96,18 +96,23 @@ fn read(blocks: &Blocks, loaders: &Loaders, wanted: &[u32]) -> bool {
     }
     // As kernels do, without a look at the table if there seems to be no need of it.
     let in_order = blocks.slots.are_in_order();
-    let look = |block: usize| {
-        let place = if in_order { blocks.slots.home(block * BLOCK) } else { blocks.slots.at(block) };
+    let find = |block: usize| {
+        if in_order { blocks.slots.home(block * BLOCK) } else { blocks.slots.at(block) }
+    };
+    let look = |block: usize, place: *const u8| {
         // SAFETY: it was here when the epoch had been entered, which goes on.
         let bytes: &[u8; BLOCK] = unsafe { &*place.cast() };
         assert!(bytes.iter().all(|&byte| byte == number(block)), "block {block} is another's");
     };
+    // Where a block lies is asked once, and holds until the epoch ends, wherever it may lie by then.
+    let found: Vec<(usize, *const u8)> =
+        wanted.iter().map(|&block| (block as usize, find(block as usize))).collect();
     for _ in 0..2 {
-        wanted.iter().for_each(|&block| look(block as usize));
+        found.iter().for_each(|&(block, place)| look(block, place));
         thread::yield_now();
     }
     // What others have brought meanwhile is good, too.
-    (0..BLOCKS).filter(|&block| blocks.words.is_here(block)).for_each(look);
+    (0..BLOCKS).filter(|&block| blocks.words.is_here(block)).for_each(|block| look(block, find(block)));
     true
 }
 
@@ -162,6 +167,29 @@ pub fn a_failure_ends() {
     assert!(came.iter().sum::<usize>() < 9, "one of them cannot come");
     let came = play(1, Replacement::Fifo, Some(2), &[&[&[2]], &[&[2]], &[&[2]]]);
     assert_eq!(came, [0; 3]);
+}
+
+/// Threads read while another one moves blocks from their homes to slots.
+fn play_moves(lists: &[List]) -> usize {
+    let (blocks, loaders) = cache(2, Replacement::Lru, None);
+    let loaders = Arc::new(loaders);
+    // The first one has to go for the last, but has its home until somebody needs room. So has the one between them.
+    (0..3).for_each(|block| assert!(read(&blocks, &loaders, &[block])));
+    let threads = start(&blocks, &loaders, lists);
+    let moved = (0..3)
+        .map(|_| {
+            thread::yield_now();
+            blocks.move_in()
+        })
+        .sum();
+    threads.into_iter().for_each(|thread| assert!(thread.join().is_ok(), "no panic"));
+    leaves_nothing(&blocks);
+    moved
+}
+
+pub fn blocks_move() {
+    assert_eq!(play_moves(&[&[&[1], &[1, 2]], &[&[2], &[2, 1]]]), 2);
+    assert!(play_moves(&[&[&[1, 4], &[5], &[0, 1]], &[&[1], &[5, 4]]]) <= 2);
 }
 
 /// Threads read lists of blocks while another one asks for some ahead of need, one list after the other; how much of its
