@@ -118,6 +118,7 @@ fn too_little_memory_and_nonsense_are_refused_beforehand() {
     );
     place.fail("cache plant.rpk --policies lru,best", &["--policies: \"best\" is none of"]);
     place.fail("cache plant.rpk --budgets 0", &["--budgets: 0 is not a share"]);
+    place.fail("cache plant.rpk --warm 0", &["--warm: 0 is not a number of flights"]);
     place.fail("cache plant.rpk --frames 0", &["--frames: 0"]);
     place.fail("cache plant.rpk --plot out.gif", &["out.gif: unknown kind of file"]);
     place.fail("cache plant.rpk --budgets 1", &["--memory: ", "is too little for this scene"]);
@@ -150,10 +151,11 @@ fn a_flight_tells_what_each_cache_did() {
     let place = place(150_000);
     let text = place.succeed(
         "cache plant.rpk --frames 3 --size 96x96 --budgets 40,400 --policies lru,sieve --loading sync,async \
-         --prefetch off,beside,ahead --loaders 3 --threads 2 --json flight.json --plot flight.svg",
+         --prefetch off,beside,ahead --loaders 3 --warm 2 --threads 2 --json flight.json --plot flight.svg",
     );
     assert!(text.is_empty() || text.contains("resident"), "{text}");
     let report = place.json("flight.json");
+    assert_eq!(report["warm_flights"], 2);
     let rows = report["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 1 + 2 * 2 * (1 + 3) * 2, "shares, policies, ways of loading, cold and warm");
     let ahead = rows.iter().filter(|row| row["cache"]["prefetch"] == "ahead");

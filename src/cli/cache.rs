@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 /// Fly a camera path through caches of a scene file: budgets, policies, ways of loading
 ///
-/// Each cache flies the path twice: cold, from nothing, and warm, with what the first flight has left. A table
+/// Each cache flies the path twice or more: cold, from nothing, and warm, with what was left before. A table
 /// has them all, beside the resident scene and the best that any policy could have done. Then come rays per
 /// second as in the tables of the seed paper (Portelli, "Out-of-core rendering of massive data sets"): one for
 /// each share in memory and way of loading, a row a frame, a column a policy.
@@ -71,6 +71,10 @@ pub struct Args {
     nodes: Option<f32>,
     #[command(flatten)]
     shape: ShapeArgs,
+    /// Warm flights, of which the last is reported: in the first, some blocks still come that a kernel looks at which
+    /// was not tried there before
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    warm: u32,
     /// Threads at work; 0 for all processors
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
@@ -120,6 +124,9 @@ impl Args {
         if let Some(budget) = self.budgets.iter().find(|budget| !(0.01..=1000.0).contains(*budget)) {
             return wrong("--budgets", format!("{budget} is not a share from 0.01 to 1000 per cent"));
         }
+        if !(1..=1000).contains(&self.warm) {
+            return wrong("--warm", format!("{} is not a number of flights from 1 to 1000", self.warm));
+        }
         let tuning = Tuning { threads: self.threads, ..Tuning::default() };
         tuning.check().map_err(as_option)?;
         let accuracy = self.accuracy.mode()?;
@@ -150,6 +157,7 @@ impl Args {
             prefetches,
             cache: self.shape.options(),
             nodes: self.nodes,
+            warm: self.warm,
             threads: tuning.worker_count(),
             accuracy,
             isa: Isa::from_env()?,

@@ -2,8 +2,8 @@
 //!
 //! The seed paper (Portelli, "Out-of-core rendering of massive data sets") flew 15 frames of 2 degrees round a
 //! model of which 16 % or 39 % was in memory. [`run`] does that for each [`Trial`], from an empty cache
-//! (*cold*) and once more with what the first time has left (*warm*), beside the resident scene; and it tells
-//! how many misses the best of all policies would have had on the same uses (`minimum`).
+//! (*cold*) and some more times with what those before have left (*warm*; the last one counts), beside the resident
+//! scene; and it tells how many misses the best of all policies would have had on the same uses (`minimum`).
 //!
 //! The system keeps files in its own memory, where a read costs some microseconds instead of what the disk
 //! takes. [`CacheOptions::direct`] goes past that; reports say which it was.
@@ -54,6 +54,9 @@ pub struct Options {
     /// The part of the memory that nodes have to themselves, in a cache of the same policy; `None` for one
     /// cache of all.
     pub nodes: Option<f32>,
+    /// Warm flights, at least one: the last is reported. In the first some blocks still come that kernels looked at
+    /// which were not tried before.
+    pub warm: u32,
     /// Threads at work.
     pub threads: usize,
     /// How hits are decided.
@@ -102,16 +105,18 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
     let resident = Accel::of_tree(file.tree()?).with_isa(options.isa).with_accuracy(options.accuracy);
     let flight = Flight::new(file, &resident, options);
     let trials = options.trials();
-    let steps = 2 * (trials.len() + 1);
+    let warm = options.warm.max(1) as usize;
+    let steps = (warm + 1) * (trials.len() + 1);
     let done = AtomicUsize::new(0);
     let step = || progress(done.fetch_add(1, Ordering::Relaxed) as f64 / steps as f64);
 
     let surface = file.stored()?;
     let renderer = Renderer::new(&resident, &surface, flight.settings.clone())?;
-    flight.fly(&renderer, None)?;
-    step();
-    let frames = flight.fly(&renderer, None)?;
-    step();
+    let mut frames = Vec::new();
+    for _ in 0..=warm {
+        frames = flight.fly(&renderer, None)?;
+        step();
+    }
     let mut rows = vec![Row::resident(frames)];
     drop(renderer);
     drop((surface, resident));
@@ -125,11 +130,13 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
         let surface = CachedSurface::new(Arc::clone(&cached), file)?;
         let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
         cached.trace_uses(true);
-        for warm in [false, true] {
+        for pass in 0..=warm {
             let frames = flight.fly(&renderer, Some(&cached))?;
             let uses = cached.take_uses();
-            let minimum = minimum::misses(&uses, cached.plan().held(), warm);
-            rows.push(Row::cached(&trial, warm, memory, &cached, frames, minimum));
+            if pass == 0 || pass == warm {
+                let minimum = minimum::misses(&uses, cached.plan().held(), pass > 0);
+                rows.push(Row::cached(&trial, pass > 0, memory, &cached, frames, minimum));
+            }
             step();
         }
     }
@@ -183,6 +190,7 @@ impl Flight {
             file_bytes: file.bytes(),
             size: options.size.to_string(),
             frames: self.cameras.len(),
+            warm_flights: options.warm,
             step_degrees: options.orbit.step,
             shadows: options.shadows,
             direct: options.cache.direct,

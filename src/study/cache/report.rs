@@ -173,6 +173,8 @@ pub struct Report {
     pub frames: usize,
     /// Degrees from one to the next.
     pub step_degrees: f64,
+    /// Warm flights; the last is reported.
+    pub warm_flights: u32,
     /// Whether there are shadow rays.
     pub shadows: bool,
     /// Whether reads went past the system's own memory of the file.
@@ -211,11 +213,15 @@ impl fmt::Display for Report {
         )?;
         writeln!(
             f,
-            "{} frames of {}, {} degrees apart, {}; {} threads, {}, {}, {}, raypack {} ({} build), {}",
+            "{} frames of {}, {} degrees apart, {}{}; {} threads, {}, {}, {}, raypack {} ({} build), {}",
             self.frames,
             self.size,
             self.step_degrees,
             if self.shadows { "camera and shadow rays" } else { "camera rays" },
+            match self.warm_flights {
+                1 => String::new(),
+                flights => format!(", warm after {flights} flights"),
+            },
             self.threads,
             self.isa,
             self.accuracy,
