@@ -7,7 +7,7 @@ use super::part::Part;
 use super::slots::Slots;
 use super::words::Words;
 use crate::geometry::Aabb;
-use crate::geometry::triangle::Triangle;
+use crate::geometry::triangle::{Corners, Triangle};
 use crate::kdtree::{Node, Scale, Tree};
 use crate::simd::prefetch;
 use std::cell::Cell;
@@ -325,6 +325,17 @@ impl<'a> View<'a> {
             let primitive = primitive as usize;
             self.peek(&self.triangles, primitive..primitive + 1, lacking);
         }
+    }
+
+    /// A triangle's corners, entered. Panics if there is no such triangle.
+    #[inline(always)]
+    pub fn corners_of(&self, primitive: u32) -> &Corners {
+        self.forget_copies();
+        let primitive = primitive as usize;
+        assert!(primitive < self.triangles.count, "there are {} triangles", self.triangles.count);
+        // SAFETY: as in `slice`.
+        let [triangle]: &[Triangle; 1] = unsafe { &*self.enter_elements(&self.triangles, primitive) };
+        &triangle.corners
     }
 
     /// Some bytes of the colours or the surfaces, entered and copied. Panics if they are out of range, or of another

@@ -95,13 +95,33 @@ pub fn linear_to_srgb(light: f32) -> u8 {
     fast_srgb8::f32_to_srgb8(light)
 }
 
-/// The colour between three corners, blended in linear light as `(1 - u - v) c0 + u c1 + v c2`.
-#[inline]
-pub(crate) fn blend(corners: [[u8; 3]; 3], u: f32, v: f32) -> Vec3 {
-    let linear = linear();
-    let [c0, c1, c2] =
-        corners.map(|[r, g, b]| Vec3::new(linear[r as usize], linear[g as usize], linear[b as usize]));
-    (1.0 - u - v) * c0 + u * c1 + v * c2
+/// A triangle's colours, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaceColor {
+    /// One for all of it.
+    One(Vec3),
+    /// One at each corner.
+    Corners([Vec3; 3]),
+}
+
+impl FaceColor {
+    /// Of a triangle whose corners have these sRGB-encoded colours.
+    #[inline]
+    pub(crate) fn of_corners(corners: [[u8; 3]; 3]) -> Self {
+        let linear = linear();
+        Self::Corners(
+            corners.map(|[r, g, b]| Vec3::new(linear[r as usize], linear[g as usize], linear[b as usize])),
+        )
+    }
+
+    /// The colour where a hit's barycentrics are `u` and `v`: those of corners blend as `(1 - u - v) c0 + u c1 + v c2`.
+    #[inline(always)]
+    pub fn at(&self, u: f32, v: f32) -> Vec3 {
+        match *self {
+            Self::One(color) => color,
+            Self::Corners([c0, c1, c2]) => (1.0 - u - v) * c0 + u * c1 + v * c2,
+        }
+    }
 }
 
 /// An sRGB triple in linear light.

@@ -22,8 +22,8 @@ mod stl;
 
 pub use attributes::{Attributes, Normal};
 pub use check::MAX_TRIANGLES;
-pub use color::{Colors, linear_to_srgb, srgb_to_linear};
-pub(crate) use color::{blend, decode};
+pub(crate) use color::decode;
+pub use color::{Colors, FaceColor, linear_to_srgb, srgb_to_linear};
 pub use image::{Image, ImageSource, MAX_IMAGE_BYTES, Packed};
 pub use material::{Channel, Map, Maps, Material};
 pub use read::{Loaded, ReadReport, parse, read, read_with_progress};
@@ -67,12 +67,20 @@ impl Mesh {
     /// `primitive` is out of range.
     #[inline]
     pub fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
+        self.face_color(primitive).at(u, v)
+    }
+
+    /// A triangle's colours. Panics if `primitive` is out of range.
+    #[inline]
+    pub fn face_color(&self, primitive: u32) -> FaceColor {
         let i = primitive as usize;
         match &self.colors {
-            Colors::Uniform(color) => *color,
-            Colors::PerTriangle(colors) => color::decode(colors[i]),
-            Colors::PerVertex(colors) => color::blend(self.triangles[i].map(|k| colors[k as usize]), u, v),
-            Colors::PerMaterial { materials, of_triangle } => materials[of_triangle[i] as usize].diffuse,
+            Colors::Uniform(color) => FaceColor::One(*color),
+            Colors::PerTriangle(colors) => FaceColor::One(color::decode(colors[i])),
+            Colors::PerVertex(colors) => FaceColor::of_corners(self.triangles[i].map(|k| colors[k as usize])),
+            Colors::PerMaterial { materials, of_triangle } => {
+                FaceColor::One(materials[of_triangle[i] as usize].diffuse)
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use super::offset::offset_point;
 use super::shade::{has_unit, unit_normal, unit_of};
 use super::tile::lanes;
 use crate::geometry::Ray;
-use crate::scene::{Light, Lighting, Look, ShadowRay};
+use crate::scene::{Face, Light, Lighting, Look, ShadowRay};
 use crate::simd::{Simd, Task};
 use crate::traverse::{HitPacket, RayPacket};
 use glam::Vec3;
@@ -50,15 +50,20 @@ impl<const W: usize> Found<W> {
     #[inline(always)]
     pub fn look_up(&mut self, surfaces: &impl Look, hits: &HitPacket<W>, active: u32) {
         self.hit = 0;
+        // Where triangles are larger than pixels, lanes that follow one another hit the same.
+        let mut last: Option<(u32, Face)> = None;
         for lane in lanes(active) {
             let hit = hits.get(lane);
             if hit.is_hit() {
                 self.hit |= 1 << lane;
-                let (corners, color) = surfaces.look(hit.primitive, hit.u, hit.v);
-                for (all, corner) in self.corners.iter_mut().zip(corners) {
+                let (_, face) = match &mut last {
+                    Some(seen) if seen.0 == hit.primitive => seen,
+                    last => last.insert((hit.primitive, surfaces.face(hit.primitive))),
+                };
+                for (all, corner) in self.corners.iter_mut().zip(face.corners) {
                     set(all, lane, corner);
                 }
-                set(&mut self.color, lane, color);
+                set(&mut self.color, lane, face.color.at(hit.u, hit.v));
             }
         }
     }

@@ -1,10 +1,9 @@
 //! Surfaces of a scene of which a part is in memory.
 
-use super::surface::{Detail, Look, Surface};
+use super::surface::{Detail, Face, Look, Surface};
 use crate::cache::{Array, Cached, View};
 use crate::error::Result;
-use crate::kdtree::Tree;
-use crate::mesh::{Attributes, Image, Material, blend, decode};
+use crate::mesh::{Attributes, FaceColor, Image, Material, decode};
 use crate::store::{self, ColorMeta, SurfaceRecord};
 use glam::Vec3;
 use std::sync::Arc;
@@ -66,29 +65,30 @@ impl CachedSurface {
 
     #[inline]
     fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
-        view.enter_triangle(primitive);
-        let corners = view.corners(primitive);
+        let corners = view.corners_of(primitive);
         let scale = self.cached.scale();
         if scale.is_none() { *corners } else { scale.undo(corners) }.map(Vec3::from_array)
     }
 
     #[inline]
-    fn color_in(&self, view: &View<'_>, primitive: u32, u: f32, v: f32) -> Vec3 {
+    fn color_in(&self, view: &View<'_>, primitive: u32) -> FaceColor {
         match &self.paint {
-            CachedPaint::PerMaterial(diffuse) => diffuse[self.material_in(view, primitive) as usize],
-            _ => self.color_beside(view, primitive, u, v),
+            CachedPaint::PerMaterial(diffuse) => {
+                FaceColor::One(diffuse[self.material_in(view, primitive) as usize])
+            }
+            _ => self.color_beside(view, primitive),
         }
     }
 
-    /// The colour where it is not the material's.
-    fn color_beside(&self, view: &View<'_>, primitive: u32, u: f32, v: f32) -> Vec3 {
+    /// The colours where they are not the material's.
+    fn color_beside(&self, view: &View<'_>, primitive: u32) -> FaceColor {
         let at = |bytes: usize| primitive as usize * bytes;
         match &self.paint {
-            CachedPaint::Uniform(color) => *color,
-            CachedPaint::PerTriangle => decode(view.bytes::<3>(Array::Colors, at(3))),
+            CachedPaint::Uniform(color) => FaceColor::One(*color),
+            CachedPaint::PerTriangle => FaceColor::One(decode(view.bytes::<3>(Array::Colors, at(3)))),
             CachedPaint::PerCorner => {
                 let [a, b, c, d, e, f, g, h, i] = view.bytes::<9>(Array::Colors, at(9));
-                blend([[a, b, c], [d, e, f], [g, h, i]], u, v)
+                FaceColor::of_corners([[a, b, c], [d, e, f], [g, h, i]])
             }
             CachedPaint::PerMaterial(_) => unreachable!("it is the material's"),
         }
@@ -118,7 +118,7 @@ impl CachedSurface {
         };
         let color = match &self.paint {
             CachedPaint::PerMaterial(diffuse) => diffuse[material as usize],
-            _ => self.color_beside(view, primitive, u, v),
+            _ => self.color_beside(view, primitive).at(u, v),
         };
         Detail { corners: self.corners_in(view, primitive), color, material, attributes }
     }
@@ -137,9 +137,9 @@ pub struct CachedReader<'a> {
 
 impl Look for CachedReader<'_> {
     #[inline]
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
+    fn face(&self, primitive: u32) -> Face {
         let Self { surface, view } = self;
-        (surface.corners_in(view, primitive), surface.color_in(view, primitive, u, v))
+        Face { corners: surface.corners_in(view, primitive), color: surface.color_in(view, primitive) }
     }
 
     #[inline]
@@ -166,7 +166,7 @@ impl Surface for CachedSurface {
     }
 
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
-        self.color_in(&self.cached.view(), primitive, u, v)
+        self.color_in(&self.cached.view(), primitive).at(u, v)
     }
 
     fn material(&self, primitive: u32) -> u32 {

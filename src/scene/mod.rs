@@ -25,5 +25,5 @@ pub use environment::{Environment, EnvironmentSample};
 pub use light::{Ambient, Light, Lighting, ShadowRay};
 pub use lights::Lights;
 pub use path::Orbit;
-pub use surface::{Detail, Look, Surface};
+pub use surface::{Detail, Face, Look, Surface};
 pub use view::View;

@@ -1,6 +1,6 @@
 //! What shading asks of the triangles that rays hit.
 
-use crate::mesh::{Attributes, Image, Material, Mesh};
+use crate::mesh::{Attributes, FaceColor, Image, Material, Mesh};
 use crate::store::Stored;
 use glam::Vec3;
 
@@ -38,12 +38,21 @@ pub trait Surface: Sync {
 
 /// What shading looks at.
 pub trait Look {
-    /// A triangle's corners, and the reflectance where a hit's barycentrics are `u` and `v`: see [`Surface`].
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3);
+    /// A triangle's corners and colours: all that there is to know of matt ones.
+    fn face(&self, primitive: u32) -> Face;
     /// The index of a triangle's material; 0 in scenes that have none.
     fn material(&self, primitive: u32) -> u32;
     /// All that there is to know about a triangle.
     fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail;
+}
+
+/// A triangle, for shading of matt surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Face {
+    /// Its corners, in the scene's coordinates.
+    pub corners: [Vec3; 3],
+    /// Its reflectance.
+    pub color: FaceColor,
 }
 
 /// A triangle, for shading that does more than matt surfaces.
@@ -61,8 +70,8 @@ pub struct Detail {
 
 impl Look for &Mesh {
     #[inline(always)]
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
-        (self.corners(primitive), self.color(primitive, u, v))
+    fn face(&self, primitive: u32) -> Face {
+        Face { corners: self.corners(primitive), color: self.face_color(primitive) }
     }
 
     #[inline(always)]
@@ -83,8 +92,8 @@ impl Look for &Mesh {
 
 impl Look for &Stored {
     #[inline(always)]
-    fn look(&self, primitive: u32, u: f32, v: f32) -> ([Vec3; 3], Vec3) {
-        (self.corners(primitive), self.color(primitive, u, v))
+    fn face(&self, primitive: u32) -> Face {
+        Face { corners: self.corners(primitive), color: self.face_color(primitive) }
     }
 
     #[inline(always)]
@@ -96,7 +105,7 @@ impl Look for &Stored {
     fn detail(&self, primitive: u32, u: f32, v: f32) -> Detail {
         Detail {
             corners: self.corners(primitive),
-            color: self.color(primitive, u, v),
+            color: self.face_color(primitive).at(u, v),
             material: Stored::material(self, primitive),
             attributes: self.attributes(primitive),
         }
@@ -118,7 +127,7 @@ impl Surface for Mesh {
 
     #[inline(always)]
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
-        self.color(primitive, u, v)
+        self.face_color(primitive).at(u, v)
     }
 
     #[inline(always)]
@@ -166,7 +175,7 @@ impl Surface for Stored {
 
     #[inline(always)]
     fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
-        self.color(primitive, u, v)
+        self.face_color(primitive).at(u, v)
     }
 
     #[inline(always)]

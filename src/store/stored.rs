@@ -8,7 +8,7 @@ use super::substance::Substances;
 use crate::column::Column;
 use crate::error::Result;
 use crate::geometry::triangle::Triangle;
-use crate::mesh::{Attributes, Image, Material, blend, decode};
+use crate::mesh::{Attributes, FaceColor, Image, Material, decode};
 use glam::Vec3;
 
 /// The surfaces of a stored scene: where a triangle's corners are, what colour and material it has, and what its
@@ -130,10 +130,10 @@ impl Stored {
         }
     }
 
-    /// As [`Mesh::color`](crate::mesh::Mesh::color).
+    /// As [`Mesh::face_color`](crate::mesh::Mesh::face_color).
     #[inline]
-    pub fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
-        self.paint.color(primitive, u, v)
+    pub fn face_color(&self, primitive: u32) -> FaceColor {
+        self.paint.face_color(primitive)
     }
 
     /// The index of a triangle's material, 0 if the scene has none. Panics if `primitive` is out of range.
@@ -187,15 +187,17 @@ impl Stored {
 }
 
 impl Paint {
-    /// As [`Mesh::color`](crate::mesh::Mesh::color), to the bit.
+    /// As [`Mesh::face_color`](crate::mesh::Mesh::face_color), to the bit.
     #[inline]
-    pub fn color(&self, primitive: u32, u: f32, v: f32) -> Vec3 {
+    pub fn face_color(&self, primitive: u32) -> FaceColor {
         let i = primitive as usize;
         match self {
-            Self::Uniform(color) => *color,
-            Self::PerTriangle(colors) => decode(colors[i]),
-            Self::PerCorner(colors) => blend(colors[i], u, v),
-            Self::PerMaterial { diffuse, of_triangle } => diffuse[of_triangle.at(primitive) as usize],
+            Self::Uniform(color) => FaceColor::One(*color),
+            Self::PerTriangle(colors) => FaceColor::One(decode(colors[i])),
+            Self::PerCorner(colors) => FaceColor::of_corners(colors[i]),
+            Self::PerMaterial { diffuse, of_triangle } => {
+                FaceColor::One(diffuse[of_triangle.at(primitive) as usize])
+            }
         }
     }
 }
