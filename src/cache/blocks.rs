@@ -186,7 +186,7 @@ impl Blocks {
     /// From now on, writes uses down, or no longer does. Where nothing ever has to go, it is enough to know which blocks
     /// were used at all.
     pub fn trace_uses(&self, on: bool) {
-        self.words.trace(on, !self.holds_all);
+        self.words.trace_uses(on, !self.holds_all);
     }
 
     /// What a thread knew that has ended; nothing if there is none. As many threads as are at work at a time can keep

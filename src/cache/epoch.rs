@@ -87,6 +87,11 @@ impl Reader {
         self.epochs.now.load(Ordering::SeqCst)
     }
 
+    /// Its number: no other reader that is there has the same.
+    pub fn number(&self) -> usize {
+        self.slot
+    }
+
     /// Leaves it: everything that was found in it may be gone.
     #[inline]
     pub fn leave(&self) {

@@ -5,6 +5,7 @@ use super::epoch::Reader;
 use super::known::Known;
 use super::scraps::Scraps;
 use super::stats::{add, nanos};
+use super::words::Notes;
 use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,6 +17,8 @@ pub struct Local {
     reader: Reader,
     /// What it has seen, and threads before it that have ended; nothing before its first square.
     known: Known,
+    /// What it has used since it began.
+    pub notes: Notes,
     /// What lies across the borders of blocks, as long as it is looked at.
     pub scraps: Scraps,
     /// Uses inside of one another: the outermost one is in an epoch.
@@ -41,6 +44,7 @@ impl Local {
                 blocks: Arc::clone(blocks),
                 reader: blocks.epochs.reader().expect("fewer than 4096 threads use a scene"),
                 known: Known::default(),
+                notes: Notes::default(),
                 scraps: Scraps::default(),
                 depth: 0,
                 at_gate: false,
@@ -93,10 +97,7 @@ impl Local {
         self.depth -= 1;
         if self.depth == 0 {
             self.reader.leave();
-            let uses = self.known.take_uses();
-            if uses > 0 {
-                self.blocks.words.add_uses(uses);
-            }
+            self.blocks.words.hand_over(&self.notes, self.known.take_uses(), self.reader.number());
         }
     }
 

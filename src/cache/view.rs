@@ -76,7 +76,7 @@ impl<'a> View<'a> {
     fn use_all(&self, blocks: Range<usize>) -> bool {
         let mut here = true;
         for block in blocks {
-            here &= self.words.use_in(block, self.tick);
+            here &= self.words.use_in(block, self.tick, &self.local().notes);
         }
         here
     }

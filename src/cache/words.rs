@@ -13,8 +13,9 @@
 //! all.
 
 use super::policy::Use;
-use super::sync::{AtomicBool, AtomicU32, AtomicU64, Mutex, Ordering, PoisonError};
+use super::sync::{AtomicBool, AtomicU32, AtomicU64, Mutex, MutexGuard, Ordering, PoisonError};
 use crossbeam::utils::CachePadded;
+use std::cell::{Cell, RefCell};
 
 const HERE: u32 = 1 << 31;
 const COUNT: u32 = 0x7f << 24;
@@ -34,10 +35,18 @@ pub struct Words {
     tracing: AtomicBool,
     /// Whether that is all of them, and not only each block's first one since it came.
     tracing_all: AtomicBool,
-    /// First uses in a tick, of every so-manieth block: threads that count at the same time do not wait for one another.
+    /// First uses in a tick, by threads and loaders: those that count at the same time do not wait for one another.
     uses: [CachePadded<AtomicU64>; COUNTERS],
     /// Blocks that came ahead of need: those that were used afterwards, and those that went unused.
     ahead: CachePadded<[AtomicU64; 2]>,
+}
+
+/// First uses in a tick that one thread has made and not yet [handed over](Words::hand_over): a square's, or a query's. To
+/// count and to write down each at once would have threads wait for one another.
+#[derive(Debug, Default)]
+pub struct Notes {
+    uses: Cell<u64>,
+    trace: RefCell<Vec<u32>>,
 }
 
 /// Whether a word says that its block is here and was used in a tick.
@@ -69,11 +78,11 @@ impl Words {
     ///
     /// A true answer is good for as long as the reader stays in its [epoch](super::epoch).
     #[inline(always)]
-    pub fn use_in(&self, block: usize, tick: u32) -> bool {
+    pub fn use_in(&self, block: usize, tick: u32, notes: &Notes) -> bool {
         // What the loader wrote before it said that the block is here is seen from now on.
         let word = self.words[block].load(Ordering::Acquire);
         // Of a block that nobody has used, this says no in every tick.
-        was_used(word, tick) || self.mark(block, word, tick)
+        was_used(word, tick) || self.mark(block, word, tick, notes)
     }
 
     /// Whether a block is here that was used in a tick before: as [`use_in`](Self::use_in), without a first use.
@@ -84,7 +93,7 @@ impl Words {
 
     /// Takes note of the first use in a tick.
     #[inline(never)]
-    fn mark(&self, block: usize, mut word: u32, tick: u32) -> bool {
+    fn mark(&self, block: usize, mut word: u32, tick: u32, notes: &Notes) -> bool {
         // An exchange, so that a block that goes meanwhile is not called back.
         while word & HERE != 0 {
             let count = if word & COUNT == COUNT { COUNT } else { (word & COUNT) + ONE };
@@ -92,7 +101,10 @@ impl Words {
             match self.words[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
                 Ok(_) => {
                     self.count_ahead(word, 0);
-                    self.note(block, word & UNUSED != 0);
+                    notes.uses.set(notes.uses.get() + 1);
+                    if self.is_traced(word & UNUSED != 0) {
+                        notes.trace.borrow_mut().push(block as u32);
+                    }
                     return true;
                 }
                 Err(now) => word = now,
@@ -101,11 +113,26 @@ impl Words {
         false
     }
 
-    fn note(&self, block: usize, is_first: bool) {
-        self.uses[block % COUNTERS].fetch_add(1, Ordering::Relaxed);
-        if self.is_tracing_all() || is_first && self.tracing.load(Ordering::Relaxed) {
-            self.trace.lock().unwrap_or_else(PoisonError::into_inner).push(block as u32);
+    /// Whether a use is written down, which may be a block's first one since it came.
+    fn is_traced(&self, is_first: bool) -> bool {
+        self.is_tracing_all() || is_first && self.tracing.load(Ordering::Relaxed)
+    }
+
+    /// Takes over what a thread has noted, with so many first uses more, which were of lists that are known to be here.
+    /// Threads with other numbers do not wait for this one.
+    pub fn hand_over(&self, notes: &Notes, more: u64, thread: usize) {
+        let uses = notes.uses.take() + more;
+        if uses > 0 {
+            self.uses[thread % COUNTERS].fetch_add(uses, Ordering::Relaxed);
         }
+        let mut trace = notes.trace.borrow_mut();
+        if !trace.is_empty() {
+            self.trace().append(&mut trace);
+        }
+    }
+
+    fn trace(&self) -> MutexGuard<'_, Vec<u32>> {
+        self.trace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// If a word is that of a block that nobody has used: counts it among those that were used now, or among those
@@ -119,13 +146,10 @@ impl Words {
     /// Uses a block that is pinned and came ahead of need, if nobody has used it yet.
     pub fn use_first(&self, block: usize, tick: u32) {
         if self.is_unused(block) {
-            self.use_in(block, tick);
+            let notes = Notes::default();
+            self.use_in(block, tick, &notes);
+            self.hand_over(&notes, 0, block);
         }
-    }
-
-    /// Counts first uses in a tick that were no use of any block: of lists that are known to be here.
-    pub fn add_uses(&self, uses: u64) {
-        self.uses[0].fetch_add(uses, Ordering::Relaxed);
     }
 
     /// Whether all first uses in a tick are being noted down.
@@ -145,14 +169,14 @@ impl Words {
 
     /// Notes first uses in a tick down from now on, or no longer does; unless `all`, only each block's first one since
     /// it came.
-    pub fn trace(&self, on: bool, all: bool) {
+    pub fn trace_uses(&self, on: bool, all: bool) {
         self.tracing.store(on, Ordering::Relaxed);
         self.tracing_all.store(on && all, Ordering::Relaxed);
     }
 
     /// What was noted down since the last call, in about the order of use.
     pub fn take_trace(&self) -> Vec<u32> {
-        std::mem::take(&mut *self.trace.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *self.trace())
     }
 
     /// Whether a block is here; no use.
@@ -175,7 +199,10 @@ impl Words {
     /// Says that a block is here, used once; all that was written to it before is seen by who sees that.
     pub fn arrive(&self, block: usize, tick: u32) -> Use {
         self.words[block].store(HERE | ONE | (tick & TICK), Ordering::Release);
-        self.note(block, true);
+        self.uses[block % COUNTERS].fetch_add(1, Ordering::Relaxed);
+        if self.is_traced(true) {
+            self.trace().push(block as u32);
+        }
         Use { tick: tick & TICK, count: 1 }
     }
 
@@ -215,44 +242,71 @@ impl Words {
 mod tests {
     use super::*;
 
+    /// A use that is handed over at once.
+    fn use_in(words: &Words, block: usize, tick: u32) -> bool {
+        let notes = Notes::default();
+        let is_here = words.use_in(block, tick, &notes);
+        words.hand_over(&notes, 0, 0);
+        is_here
+    }
+
     #[test]
     fn uses_are_counted_by_tick() {
         let words = Words::new(2);
-        assert!(!words.use_in(1, 7));
+        assert!(!use_in(&words, 1, 7));
         words.arrive(1, 7);
         assert_eq!(words.uses(1), Use { tick: 7, count: 1 });
-        assert!(words.use_in(1, 7) && words.use_in(1, 7));
+        assert!(use_in(&words, 1, 7) && use_in(&words, 1, 7));
         assert_eq!(words.uses(1), Use { tick: 7, count: 1 });
-        assert!(words.use_in(1, 9));
+        assert!(use_in(&words, 1, 9));
         assert_eq!(words.uses(1), Use { tick: 9, count: 2 });
-        (0..300).for_each(|tick| assert!(words.use_in(1, tick)));
+        (0..300).for_each(|tick| assert!(use_in(&words, 1, tick)));
         assert_eq!(words.uses(1), Use { tick: 299, count: 127 });
         assert!(!words.is_here(0) && words.is_here(1));
-        words.trace(true, true);
-        assert!(words.use_in(1, 300) && words.use_in(1, 300) && !words.use_in(0, 300));
+        words.trace_uses(true, true);
+        assert!(use_in(&words, 1, 300) && use_in(&words, 1, 300) && !use_in(&words, 0, 300));
         words.arrive(0, 301);
-        words.trace(false, false);
-        assert!(words.use_in(1, 301));
+        words.trace_uses(false, false);
+        assert!(use_in(&words, 1, 301));
         assert_eq!((words.take_trace(), words.take_trace()), (vec![1, 0], vec![]));
         words.leave(1);
-        assert!(!words.use_in(1, 299));
+        assert!(!use_in(&words, 1, 299));
         assert_eq!(words.uses(1), Use::default());
     }
 
     #[test]
     fn first_uses_alone_are_written_down_where_that_will_do() {
         let words = Words::new(2);
-        words.trace(true, false);
+        words.trace_uses(true, false);
         assert!(!words.is_tracing_all());
         words.arrive(0, 1);
         words.arrive_ahead(1, 1);
-        assert!((2..5).all(|tick| words.use_in(0, tick) && words.use_in(1, tick)));
+        assert!((2..5).all(|tick| use_in(&words, 0, tick) && use_in(&words, 1, tick)));
         assert_eq!((words.take_trace(), words.take_uses()), (vec![0, 1], 7));
-        words.trace(true, true);
-        assert!(words.is_tracing_all() && words.use_in(1, 5));
-        words.trace(false, true);
-        assert!(!words.is_tracing_all() && words.use_in(1, 6));
+        words.trace_uses(true, true);
+        assert!(words.is_tracing_all() && use_in(&words, 1, 5));
+        words.trace_uses(false, true);
+        assert!(!words.is_tracing_all() && use_in(&words, 1, 6));
         assert_eq!(words.take_trace(), [1]);
+    }
+
+    #[test]
+    fn a_thread_s_notes_are_its_own_until_it_hands_them_over() {
+        let (words, notes) = (Words::new(3), [(); 2].map(|()| Notes::default()));
+        words.trace_uses(true, true);
+        for block in 0..3 {
+            words.arrive(block, 0);
+        }
+        assert_eq!((words.take_trace(), words.take_uses()), (vec![0, 1, 2], 3));
+        assert!(
+            words.use_in(2, 1, &notes[0]) && words.use_in(1, 1, &notes[1]) && words.use_in(0, 1, &notes[0])
+        );
+        assert_eq!((words.take_trace(), words.take_uses()), (vec![], 0));
+        words.hand_over(&notes[0], 7, 1);
+        assert_eq!((words.take_trace(), words.take_uses()), (vec![2, 0], 9));
+        words.hand_over(&notes[0], 0, 1);
+        words.hand_over(&notes[1], 0, 0);
+        assert_eq!((words.take_trace(), words.take_uses()), (vec![1], 1));
     }
 
     #[test]
@@ -264,7 +318,7 @@ mod tests {
         }
         assert_eq!((words.take_uses(), words.take_ahead()), (0, [0, 0]));
         // Used in the tick in which it came, once; used by who pins it; gone unused, in both ways; used at once.
-        assert!(words.use_in(0, 0) && words.use_in(0, 0) && words.use_in(0, 1));
+        assert!(use_in(&words, 0, 0) && use_in(&words, 0, 0) && use_in(&words, 0, 1));
         words.use_first(1, 0);
         words.use_first(1, 1);
         assert!(!words.leave_unused(0) && !words.leave_unused(1) && words.leave_unused(2));
@@ -282,7 +336,7 @@ mod tests {
         let words = Words::new(1);
         for tick in [0, 1, 6, 7, 8, TICK] {
             words.arrive_ahead(0, 7);
-            assert!(words.use_in(0, tick) && !words.is_unused(0), "{tick}");
+            assert!(use_in(&words, 0, tick) && !words.is_unused(0), "{tick}");
             words.leave(0);
         }
         assert_eq!((words.take_uses(), words.take_ahead()), (6, [6, 0]));
