@@ -26,13 +26,16 @@ pub(super) const fn squares(pixels: u32) -> usize {
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
 
+/// Answers, packet by packet, what was asked of their lanes at a place.
+type Call<const W: usize, A> = fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [A]);
+
 /// How a square's packets are traced. What was learnt from the squares before is there for those who can
 /// use it.
 pub(super) struct Calls<const W: usize> {
     /// The closest hits of the lanes given with each packet.
-    intersect: fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [HitPacket<W>]),
+    intersect: Call<W, HitPacket<W>>,
     /// Which of those lanes hit anything.
-    occluded: fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [u32]),
+    occluded: Call<W, u32>,
 }
 
 impl<const W: usize> Calls<W>
