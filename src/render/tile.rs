@@ -44,16 +44,8 @@ where
 {
     /// Packet by packet.
     pub const PACKETS: Self = Self {
-        intersect: |_, accel, _, rays, active, hits| {
-            for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
-                *hits = accel.intersect_packet(rays, active);
-            }
-        },
-        occluded: |_, accel, _, rays, active, occluded| {
-            for ((rays, &active), occluded) in rays.iter().zip(active).zip(occluded) {
-                *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
-            }
-        },
+        intersect: |_, accel, _, rays, active, hits| accel.intersect_packets(rays, active, hits),
+        occluded: |_, accel, _, rays, active, occluded| accel.occluded_packets(rays, active, occluded),
     };
 }
 

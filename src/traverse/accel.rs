@@ -16,6 +16,7 @@ use crate::kdtree::{BuildParams, BuildProgress, KdTree, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa};
 use rayon::prelude::*;
+use std::slice::{from_mut, from_ref};
 use std::sync::Arc;
 
 /// A mesh made ready for tracing: its tree, and the instruction set to trace with.
@@ -214,7 +215,24 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        rays.intersect(self, active & lanes_of(W))
+        let mut hits = [HitPacket::miss()];
+        PacketWidth::intersect(self, from_ref(rays), &[active & lanes_of(W)], &mut hits);
+        let [hits] = hits;
+        hits
+    }
+
+    /// The same for packets that follow one another: quicker than one by one in a scene of which a part is in memory.
+    /// Panics if there are not as many of all, or a bit is set in `active` beyond `W`.
+    pub fn intersect_packets<const W: usize>(
+        &self,
+        rays: &[RayPacket<W>],
+        active: &[u32],
+        hits: &mut [HitPacket<W>],
+    ) where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        check_packets::<W>(rays.len(), active, hits.len());
+        PacketWidth::intersect(self, rays, active, hits);
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies.
@@ -223,28 +241,51 @@ impl Accel {
     where
         RayPacket<W>: PacketWidth<W>,
     {
-        rays.occluded(self, active & lanes_of(W))
+        let mut found = 0;
+        PacketWidth::occluded(self, from_ref(rays), &[active & lanes_of(W)], from_mut(&mut found));
+        found
     }
 
-    /// [`intersect_packet`](Self::intersect_packet) in two packets of 8: quicker where rays part.
-    pub fn intersect_halves(&self, rays: &RayPacket<16>, active: u32) -> HitPacket<16> {
-        let mut hits = HitPacket::miss();
-        for half in 0..2 {
-            let active = active >> (half * 8) & lanes_of(8);
-            if active != 0 {
-                hits.set_part(half, &self.intersect_packet::<8>(&rays.part(half), active));
+    /// The same for packets that follow one another, as [`intersect_packets`](Self::intersect_packets).
+    pub fn occluded_packets<const W: usize>(&self, rays: &[RayPacket<W>], active: &[u32], found: &mut [u32])
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        check_packets::<W>(rays.len(), active, found.len());
+        PacketWidth::occluded(self, rays, active, found);
+    }
+
+    /// [`intersect_packets`](Self::intersect_packets), each in two packets of 8: quicker where rays part.
+    pub fn intersect_halves(&self, rays: &[RayPacket<16>], active: &[u32], hits: &mut [HitPacket<16>]) {
+        check_packets::<16>(rays.len(), active, hits.len());
+        for ((rays, active), hits) in
+            rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(hits.chunks_mut(PACKETS))
+        {
+            let (halves, lanes) = halves_of(rays, active);
+            let mut found = [const { HitPacket::miss() }; 2 * PACKETS];
+            let count = 2 * rays.len();
+            PacketWidth::intersect(self, &halves[..count], &lanes[..count], &mut found[..count]);
+            for (hits, [first, second]) in hits.iter_mut().zip(found.as_chunks().0) {
+                hits.set_part(0, first);
+                hits.set_part(1, second);
             }
         }
-        hits
     }
 
-    /// [`occluded_packet`](Self::occluded_packet) in two packets of 8.
-    pub fn occluded_halves(&self, rays: &RayPacket<16>, active: u32) -> u32 {
-        (0..2)
-            .map(|half| (half, active >> (half * 8) & lanes_of(8)))
-            .filter(|&(_, active)| active != 0)
-            .map(|(half, active)| self.occluded_packet::<8>(&rays.part(half), active) << (half * 8))
-            .sum()
+    /// [`occluded_packets`](Self::occluded_packets), each in two packets of 8.
+    pub fn occluded_halves(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
+        check_packets::<16>(rays.len(), active, occluded.len());
+        for ((rays, active), occluded) in
+            rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(occluded.chunks_mut(PACKETS))
+        {
+            let (halves, lanes) = halves_of(rays, active);
+            let mut found = [0; 2 * PACKETS];
+            let count = 2 * rays.len();
+            PacketWidth::occluded(self, &halves[..count], &lanes[..count], &mut found[..count]);
+            for (occluded, [first, second]) in occluded.iter_mut().zip(found.as_chunks().0) {
+                *occluded = first | second << 8;
+            }
+        }
     }
 
     /// The closest hits of up to sixteen packets that share their origin, as squares of a picture do; the
@@ -369,6 +410,24 @@ impl Accel {
             }
         }
     }
+}
+
+/// Panics if there are not as many packets, lanes and answers, or there are lanes beyond `W`.
+fn check_packets<const W: usize>(rays: usize, active: &[u32], answers: usize) {
+    assert!(rays == active.len() && rays == answers, "as many lanes and answers as packets");
+    assert!(active.iter().all(|lanes| lanes & !lanes_of(W) == 0), "no lanes beyond {W}");
+}
+
+/// Up to a tile's packets in halves, and the lanes of each.
+fn halves_of(rays: &[RayPacket<16>], active: &[u32]) -> ([RayPacket<8>; 2 * PACKETS], [u32; 2 * PACKETS]) {
+    let mut halves = [const { RayPacket::empty() }; 2 * PACKETS];
+    let mut lanes = [0; 2 * PACKETS];
+    let places = halves.as_chunks_mut::<2>().0.iter_mut().zip(lanes.as_chunks_mut::<2>().0);
+    for ((rays, active), (halves, lanes)) in rays.iter().zip(active).zip(places) {
+        *halves = [rays.part(0), rays.part(1)];
+        *lanes = [active & lanes_of(8), active >> 8];
+    }
+    (halves, lanes)
 }
 
 /// Up to a tile's rays as packets, and the lanes that hold one.

@@ -40,41 +40,55 @@ impl<Q: Query, M: Mode, T: Records<M>> Task for InMode<'_, Q, M, T> {
     }
 }
 
-/// The closest hits of a packet's lanes in `active`.
-pub struct IntersectPacket<'a, const W: usize> {
-    pub rays: &'a RayPacket<W>,
-    pub active: u32,
+/// The closest hits of packets' lanes in `active`, packet by packet. In a scene that is in memory in part, all of them
+/// look through one view.
+pub struct IntersectPackets<'a, const W: usize> {
+    pub rays: &'a [RayPacket<W>],
+    pub active: &'a [u32],
+    pub hits: &'a mut [HitPacket<W>],
 }
 
-impl<const W: usize> Query for IntersectPacket<'_, W>
+impl<const W: usize> Query for IntersectPackets<'_, W>
 where
     RayPacket<W>: PacketWidth<W>,
 {
-    type Output = HitPacket<W>;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> HitPacket<W> {
-        let Self { rays, active } = self;
-        packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, rays, active)
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) {
+        let Self { rays, active, hits } = self;
+        for ((rays, &active), hits) in rays.iter().zip(active).zip(hits) {
+            *hits =
+                packet::intersect::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, rays, active);
+        }
     }
 }
 
-/// The lanes in `active` of a packet that hit anything.
-pub struct OccludedPacket<'a, const W: usize> {
-    pub rays: &'a RayPacket<W>,
-    pub active: u32,
+/// The lanes in `active` of packets that hit anything, likewise.
+pub struct OccludedPackets<'a, const W: usize> {
+    pub rays: &'a [RayPacket<W>],
+    pub active: &'a [u32],
+    pub found: &'a mut [u32],
 }
 
-impl<const W: usize> Query for OccludedPacket<'_, W>
+impl<const W: usize> Query for OccludedPackets<'_, W>
 where
     RayPacket<W>: PacketWidth<W>,
 {
-    type Output = u32;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> u32 {
-        let Self { rays, active } = self;
-        packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(tree, rays, active)
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) {
+        let Self { rays, active, found } = self;
+        for ((rays, &active), found) in rays.iter().zip(active).zip(found) {
+            // Of shadow rays, whole packets may have nothing to ask.
+            *found = match active {
+                0 => 0,
+                _ => packet::occluded::<W, <RayPacket<W> as PacketWidth<W>>::Lanes<S>, _, M>(
+                    tree, rays, active,
+                ),
+            };
+        }
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::accel::Accel;
 use super::lanes::{HitPacket, RayPacket};
-use super::query::{IntersectPacket, OccludedPacket};
+use super::query::{IntersectPackets, OccludedPackets};
 use super::records::{Records, Resident};
 use crate::geometry::triangle::{Candidate, Mode, Test};
 use crate::geometry::{Aabb, Hit, Ray};
@@ -130,11 +130,12 @@ impl Accel {
     pub fn intersect_sifted(&self, sieve: &dyn Sieve, rays: &[Ray], hits: &mut [Hit]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         for (rays, hits) in rays.chunks(8).zip(hits.chunks_mut(8)) {
-            let packet = RayPacket::<8>::of_slice(rays);
-            let active = (1 << rays.len()) - 1;
-            let found: HitPacket<8> = self.ask_sifted(sieve, IntersectPacket { rays: &packet, active });
+            let (packet, active) = (RayPacket::<8>::of_slice(rays), (1 << rays.len()) - 1);
+            let mut found = [HitPacket::<8>::miss()];
+            let query = IntersectPackets { rays: &[packet], active: &[active], hits: &mut found };
+            self.ask_sifted(sieve, query);
             for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = found.get(lane);
+                *hit = found[0].get(lane);
             }
         }
     }
@@ -144,11 +145,12 @@ impl Accel {
     pub fn occluded_sifted(&self, sieve: &dyn Sieve, rays: &[Ray], occluded: &mut [bool]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         for (rays, occluded) in rays.chunks(8).zip(occluded.chunks_mut(8)) {
-            let packet = RayPacket::<8>::of_slice(rays);
-            let active = (1 << rays.len()) - 1;
-            let found = self.ask_sifted(sieve, OccludedPacket { rays: &packet, active });
+            let (packet, active) = (RayPacket::<8>::of_slice(rays), (1 << rays.len()) - 1);
+            let mut found = [0];
+            let query = OccludedPackets { rays: &[packet], active: &[active], found: &mut found };
+            self.ask_sifted(sieve, query);
             for (lane, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = found >> lane & 1 == 1;
+                *occluded = found[0] >> lane & 1 == 1;
             }
         }
     }

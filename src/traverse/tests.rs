@@ -103,6 +103,59 @@ fn lanes_that_are_not_active_stay_misses() {
     assert_eq!(accel.occluded_packet(&rays, 0), 0);
 }
 
+/// Rays down onto the square and beside it, in packets whose lanes are not all active.
+fn packets_onto_the_square() -> ([RayPacket<16>; 20], [u32; 20]) {
+    let packet = |i: usize| {
+        let ray = |lane: usize| {
+            let origin = Vec3::new(lane as f32 * 0.11 - 0.3, i as f32 * 0.07 - 0.2, 1.0);
+            Ray::new(origin, Vec3::NEG_Z)
+        };
+        RayPacket::of_slice(&std::array::from_fn::<_, 16, _>(ray))
+    };
+    let lanes = |i: usize| (i as u32).wrapping_mul(0x9e37_79b9) >> 16;
+    (std::array::from_fn(packet), std::array::from_fn(|i| if i == 4 { 0 } else { lanes(i) }))
+}
+
+#[test]
+fn packets_that_follow_one_another_are_what_each_is_alone() {
+    let accel = square();
+    let (rays, active) = packets_onto_the_square();
+    let alone = rays.iter().zip(active).map(|(rays, active)| accel.intersect_packet(rays, active));
+    let alone: Vec<HitPacket<16>> = alone.collect();
+    let occluded: Vec<u32> =
+        rays.iter().zip(active).map(|(rays, active)| accel.occluded_packet(rays, active)).collect();
+    let hit: u32 =
+        alone.iter().map(|hits| (0..16).filter(|&lane| hits.get(lane).is_hit()).count() as u32).sum();
+    assert!(hit > 50 && hit == occluded.iter().map(|lanes| lanes.count_ones()).sum::<u32>(), "{hit}");
+    let before = || std::array::from_fn::<_, 20, _>(|_| HitPacket { t: [7.0; 16], ..HitPacket::miss() });
+    let (mut hits, mut halves) = (before(), before());
+    accel.intersect_packets(&rays, &active, &mut hits);
+    accel.intersect_halves(&rays, &active, &mut halves);
+    for (i, alone) in alone.iter().enumerate() {
+        for lane in 0..16 {
+            assert_eq!([hits[i].get(lane), halves[i].get(lane)], [alone.get(lane); 2], "{i} {lane}");
+        }
+    }
+    let (mut found, mut in_halves) = ([u32::MAX; 20], [u32::MAX; 20]);
+    accel.occluded_packets(&rays, &active, &mut found);
+    accel.occluded_halves(&rays, &active, &mut in_halves);
+    assert_eq!([found, in_halves].map(Vec::from), [occluded.clone(), occluded]);
+}
+
+#[test]
+#[should_panic(expected = "no lanes beyond 16")]
+fn lanes_that_are_not_there_are_refused() {
+    let (rays, _) = packets_onto_the_square();
+    square().occluded_packets(&rays[..2], &[1, 1 << 16], &mut [0; 2]);
+}
+
+#[test]
+#[should_panic(expected = "as many lanes and answers as packets")]
+fn each_packet_has_an_answer() {
+    let (rays, active) = packets_onto_the_square();
+    square().intersect_packets(&rays, &active, &mut [const { HitPacket::miss() }; 19]);
+}
+
 /// The square enlarged by `place`, and directions of the length `speed`.
 #[test]
 fn powers_of_two_change_nothing_but_exponents() {

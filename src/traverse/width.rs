@@ -6,7 +6,7 @@
 
 use super::accel::Accel;
 use super::lanes::{HitPacket, RayPacket};
-use super::query::{IntersectPacket, OccludedPacket};
+use super::query::{IntersectPackets, OccludedPackets};
 use crate::simd::{Lanes, Simd};
 
 /// The widths that there are kernels for, and the vectors that they use: implemented for
@@ -15,13 +15,17 @@ pub trait PacketWidth<const W: usize> {
     /// `W` floats in an instruction set.
     type Lanes<S: Simd>: Lanes<W>;
 
-    /// [`Accel::intersect_packet`] for this width; no bit beyond `W` may be set in `active`.
+    /// [`Accel::intersect_packets`] for this width; no bit beyond `W` may be set in `active`.
     #[doc(hidden)]
-    fn intersect(&self, accel: &Accel, active: u32) -> HitPacket<W>;
+    fn intersect(accel: &Accel, rays: &[Self], active: &[u32], hits: &mut [HitPacket<W>])
+    where
+        Self: Sized;
 
-    /// [`Accel::occluded_packet`] for this width; no bit beyond `W` may be set in `active`.
+    /// [`Accel::occluded_packets`] for this width; no bit beyond `W` may be set in `active`.
     #[doc(hidden)]
-    fn occluded(&self, accel: &Accel, active: u32) -> u32;
+    fn occluded(accel: &Accel, rays: &[Self], active: &[u32], found: &mut [u32])
+    where
+        Self: Sized;
 }
 
 macro_rules! packet_width {
@@ -30,13 +34,13 @@ macro_rules! packet_width {
             type Lanes<S: Simd> = $lanes;
 
             #[inline(never)]
-            fn intersect(&self, accel: &Accel, active: u32) -> HitPacket<$width> {
-                $intersect(self, accel, active)
+            fn intersect(accel: &Accel, rays: &[Self], active: &[u32], hits: &mut [HitPacket<$width>]) {
+                $intersect(accel, rays, active, hits)
             }
 
             #[inline(never)]
-            fn occluded(&self, accel: &Accel, active: u32) -> u32 {
-                $occluded(self, accel, active)
+            fn occluded(accel: &Accel, rays: &[Self], active: &[u32], found: &mut [u32]) {
+                $occluded(accel, rays, active, found)
             }
         }
     };
@@ -48,43 +52,54 @@ packet_width!(8, S::F8, intersect, occluded);
 packet_width!(16, S::F16, intersect, occluded);
 
 #[inline(always)]
-fn intersect<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> HitPacket<W>
+fn intersect<const W: usize>(accel: &Accel, rays: &[RayPacket<W>], active: &[u32], hits: &mut [HitPacket<W>])
 where
     RayPacket<W>: PacketWidth<W>,
 {
-    accel.ask(IntersectPacket { rays, active })
+    accel.ask(IntersectPackets { rays, active, hits });
 }
 
 #[inline(always)]
-fn occluded<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> u32
+fn occluded<const W: usize>(accel: &Accel, rays: &[RayPacket<W>], active: &[u32], found: &mut [u32])
 where
     RayPacket<W>: PacketWidth<W>,
 {
-    accel.ask(OccludedPacket { rays, active })
+    accel.ask(OccludedPackets { rays, active, found });
 }
 
 /// The same for fewer rays than eight. In a scene that is in memory in part they go as eight: there, kernels
 /// of their own would be compiled for the sake of a few rays that wait for the disk.
 #[inline(always)]
-fn intersect_narrow<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> HitPacket<W>
-where
+fn intersect_narrow<const W: usize>(
+    accel: &Accel,
+    rays: &[RayPacket<W>],
+    active: &[u32],
+    hits: &mut [HitPacket<W>],
+) where
     RayPacket<W>: PacketWidth<W>,
 {
     if accel.cached().is_none() {
-        return accel.ask_resident(IntersectPacket { rays, active });
+        return accel.ask_resident(IntersectPackets { rays, active, hits });
     }
-    widened(rays).intersect(accel, active).first()
+    for ((rays, active), hits) in rays.iter().zip(active).zip(hits) {
+        let mut wide = [HitPacket::<8>::miss()];
+        PacketWidth::intersect(accel, &[widened(rays)], std::slice::from_ref(active), &mut wide);
+        *hits = wide[0].first();
+    }
 }
 
 #[inline(always)]
-fn occluded_narrow<const W: usize>(rays: &RayPacket<W>, accel: &Accel, active: u32) -> u32
+fn occluded_narrow<const W: usize>(accel: &Accel, rays: &[RayPacket<W>], active: &[u32], found: &mut [u32])
 where
     RayPacket<W>: PacketWidth<W>,
 {
     if accel.cached().is_none() {
-        return accel.ask_resident(OccludedPacket { rays, active });
+        return accel.ask_resident(OccludedPackets { rays, active, found });
     }
-    widened(rays).occluded(accel, active)
+    for ((rays, active), found) in rays.iter().zip(active).zip(found) {
+        let found = std::slice::from_mut(found);
+        PacketWidth::occluded(accel, &[widened(rays)], std::slice::from_ref(active), found);
+    }
 }
 
 /// The rays as the first of eight.

@@ -60,16 +60,8 @@ impl Dispatch {
     ) {
         timed(accel, &WAYS, &mut self.closest, place.closest, count(active), |kernel| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
-            Kernel::Packet8 => {
-                for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
-                    *hits = accel.intersect_halves(rays, active);
-                }
-            }
-            _ => {
-                for ((rays, &active), hits) in rays.iter().zip(active).zip(&mut *hits) {
-                    *hits = accel.intersect_packet(rays, active);
-                }
-            }
+            Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
+            _ => accel.intersect_packets(rays, active, hits),
         });
     }
 
@@ -84,16 +76,8 @@ impl Dispatch {
     ) {
         timed(accel, &WAYS, &mut self.any, place.any, count(active), |kernel| match kernel {
             Kernel::Tile => accel.occluded_tile(rays, active, occluded),
-            Kernel::Packet8 => {
-                for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
-                    *occluded = accel.occluded_halves(rays, active);
-                }
-            }
-            _ => {
-                for ((rays, &active), occluded) in rays.iter().zip(active).zip(&mut *occluded) {
-                    *occluded = if active == 0 { 0 } else { accel.occluded_packet(rays, active) };
-                }
-            }
+            Kernel::Packet8 => accel.occluded_halves(rays, active, occluded),
+            _ => accel.occluded_packets(rays, active, occluded),
         });
     }
 
