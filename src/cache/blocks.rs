@@ -20,12 +20,11 @@ use super::retired::Retired;
 use super::slots::Slots;
 use super::source::Source;
 use super::stats::{CacheStats, Counters, add, nanos};
-use super::sync::thread;
-use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, MutexGuard, Ordering, PoisonError};
+use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, Ordering, PoisonError};
 use super::words::Words;
 use crate::error::Error;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// The most threads that may read at a time.
 const READERS: usize = 4096;
@@ -34,10 +33,6 @@ const READERS: usize = 4096;
 /// with a tick of one square, a view of which all was in memory ran at 0.58 to 0.67 of the resident scene's speed, with 16
 /// at 0.83, with this at 0.87. With 1024, LRU read a third more blocks (power plant outside, 16 % in memory).
 const SESSIONS_PER_TICK: u32 = 64;
-
-/// One in so many of all blocks that may be here moves before a frame, at most: so that all have after some frames, and
-/// none takes much longer for it.
-const MOVES: usize = 8;
 
 /// What stands for the tick of the frame where there is none: then ticks go on with squares.
 const BY_SQUARES: u32 = u32::MAX;
@@ -66,14 +61,14 @@ pub struct Blocks {
     /// Whether blocks come with those that lie beside them.
     pub brings_others: bool,
     quota: Quota,
-    directories: [Option<Directory>; 2],
+    pub(super) directories: [Option<Directory>; 2],
     source: Box<dyn Source>,
     /// Blocks given up that still have their slots.
-    retired: Mutex<Retired>,
+    pub(super) retired: Mutex<Retired>,
     /// Blocks that have memory, or are about to: at most `limit`.
-    committed: AtomicUsize,
-    limit: usize,
-    most_committed: AtomicUsize,
+    pub(super) committed: AtomicUsize,
+    pub(super) limit: usize,
+    pub(super) most_committed: AtomicUsize,
     /// Blocks that had to go in this frame.
     pub gone: AtomicU32,
     /// One tick for all of a frame, as long as nothing has to go in it and had to in the one before: nobody asks then in
@@ -160,27 +155,6 @@ impl Blocks {
             self.move_in();
         }
         was_short
-    }
-
-    /// Moves some blocks from their [homes](Slots) to slots; how many.
-    pub fn move_in(&self) -> usize {
-        let most = (self.limit / MOVES).max(1);
-        let mut done = 0;
-        while done < most {
-            let count = self.take_rooms(most - done);
-            let mut retired = self.retired();
-            // SAFETY: blocks are given back by who has the lock of the list.
-            let moved = unsafe { self.slots.move_in(count, || self.epochs.earliest()) };
-            self.committed.fetch_sub(count - moved.len(), Ordering::AcqRel);
-            if moved.is_empty() {
-                break;
-            }
-            done += moved.len();
-            retired.push_homes(self.epochs.retire(), moved);
-            drop(retired);
-            self.reclaim();
-        }
-        done
     }
 
     /// From now on, writes uses down, or no longer does. Where nothing ever has to go, it is enough to know which blocks
@@ -305,7 +279,7 @@ impl Blocks {
 
     /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
     /// again, who would not find it here.
-    fn retire(&self, gone: u32) {
+    pub(super) fn retire(&self, gone: u32) {
         add(&self.counters.evictions, 1);
         self.gone.fetch_add(1, Ordering::Relaxed);
         self.frame_tick.store(BY_SQUARES, Ordering::Relaxed);
@@ -326,79 +300,6 @@ impl Blocks {
         self.slots.leave_order(|| self.epochs.retire());
         let mut retired = self.retired();
         retired.push(self.epochs.retire(), gone);
-    }
-
-    fn retired(&self) -> MutexGuard<'_, Retired> {
-        self.retired.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Frees what nobody reads any more; whether that was anything.
-    fn reclaim(&self) -> bool {
-        let mut retired = self.retired();
-        let earliest = self.epochs.earliest();
-        let mut freed = 0;
-        // Before blocks: no block that has moved since is away before its home is.
-        while let Some(homes) = retired.take_homes_before(earliest) {
-            // SAFETY: their blocks had moved before all epochs that a reader may be in.
-            unsafe { self.slots.leave_homes(&homes) };
-            freed += homes.len();
-        }
-        let free = retired.take_before(earliest);
-        // SAFETY: they were declared gone before all epochs that a reader may be in, and they can only come back by being
-        // taken out of the list, whose lock is held.
-        unsafe { self.slots.give_back(&free) };
-        freed += free.len();
-        self.committed.fetch_sub(freed, Ordering::AcqRel);
-        freed > 0
-    }
-
-    /// Waits until there is memory for one more block, and takes it.
-    pub fn make_room(&self) {
-        let mut tries = 0;
-        while !self.try_room() {
-            // Readers leave their epochs within a tile.
-            tries += 1;
-            if tries < 16 {
-                thread::yield_now()
-            } else {
-                thread::sleep(Duration::from_micros(50))
-            }
-            if tries % 16 == 0 {
-                self.shrink();
-            }
-        }
-    }
-
-    /// Takes memory for up to `most` blocks more, as many as there is at once; for how many.
-    fn take_rooms(&self, most: usize) -> usize {
-        let mut taken = 0;
-        let _ = self.committed.fetch_update(Ordering::AcqRel, Ordering::Acquire, |committed| {
-            taken = (self.limit - committed).min(most);
-            Some(committed + taken)
-        });
-        self.most_committed.fetch_max(self.committed.load(Ordering::Relaxed), Ordering::Relaxed);
-        taken
-    }
-
-    /// Takes memory for one more block, if there is some or nobody reads any more what has some.
-    pub fn try_room(&self) -> bool {
-        loop {
-            let take = |committed| (committed < self.limit).then_some(committed + 1);
-            if let Ok(before) = self.committed.fetch_update(Ordering::AcqRel, Ordering::Acquire, take) {
-                self.most_committed.fetch_max(before + 1, Ordering::Relaxed);
-                return true;
-            }
-            if !self.reclaim() {
-                return false;
-            }
-        }
-    }
-
-    /// Gives up what sets hold beyond their ways, because it was pinned when it came.
-    fn shrink(&self) {
-        for directory in self.directories.iter().flatten() {
-            directory.shrink(&self.words, &self.pins, &mut |gone| self.retire(gone));
-        }
     }
 
     /// Brings a block that the directory has said is absent; with `at_once` only if nothing has to be waited
@@ -483,11 +384,6 @@ impl Blocks {
         Ok(is_read)
     }
 
-    /// Gives back the room of a block that has not come.
-    pub fn give_room(&self) {
-        self.committed.fetch_sub(1, Ordering::AcqRel);
-    }
-
     /// Whether a block could not be read: from then on none is.
     pub fn has_failed(&self) -> bool {
         self.failed.load(Ordering::Acquire)
@@ -517,7 +413,11 @@ impl Blocks {
         }
         self.ahead.clear();
         self.reclaim();
-        self.slots.begin_anew();
+        let retired = self.retired();
+        // A home whose block has moved is somebody's as long as it waits to be left.
+        if !retired.has_homes() {
+            self.slots.begin_anew();
+        }
     }
 }
 

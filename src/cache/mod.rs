@@ -31,7 +31,7 @@
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
 //! | `requests`, `loaders` | what loaders are asked for: first what is needed, then what may be needed soon |
 //! | `ahead`, `beside`, `glance` | blocks that come before they are needed, and which ones that may be |
-//! | `blocks` | all of these at work: asking, loading, giving up |
+//! | `blocks`, `room` | all of these at work: asking, loading, giving up; memory for what comes |
 //! | `local`, `known`, `scraps` | a thread's state, what it has seen, what it has put together |
 //! | `part`, `view` | an array and the tree as a thread sees them |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
@@ -65,6 +65,7 @@ pub mod policy;
 mod quota;
 mod requests;
 mod retired;
+mod room;
 mod scraps;
 mod slots;
 mod source;

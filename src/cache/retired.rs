@@ -50,6 +50,11 @@ impl Retired {
         self.homes.push_back((epoch, blocks));
     }
 
+    /// Whether any such homes wait.
+    pub fn has_homes(&self) -> bool {
+        !self.homes.is_empty()
+    }
+
     /// Takes out a lot of those that did so before an epoch.
     pub fn take_homes_before(&mut self, epoch: u64) -> Option<Vec<u32>> {
         self.homes.front().filter(|(moved, _)| *moved < epoch)?;
@@ -84,7 +89,9 @@ mod tests {
         assert_eq!(retired.take_homes_before(3), None);
         assert_eq!(retired.take_homes_before(5), Some(vec![7, 8]));
         assert_eq!(retired.take_homes_before(4), None);
+        assert!(retired.has_homes());
         assert_eq!(retired.take_homes_before(5), Some(vec![9]));
+        assert!(!retired.has_homes());
         assert_eq!(retired.take_homes_before(5), None);
     }
 

@@ -285,7 +285,7 @@ impl Slots {
         }
     }
 
-    /// Where no block has a place, blocks come to their homes again.
+    /// Where no block has a place, blocks come to their homes again. No home may wait to be [left](Self::leave_homes).
     pub fn begin_anew(&self) {
         let mut state = self.state();
         if state.used == 0 && self.homes == Homes::AtFirst {

@@ -143,3 +143,32 @@ fn blocks_are_what_they_should_be_for_as_long_as_they_are_read() {
         }
     }
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn homes_that_wait_to_be_left_are_nobody_s_before() {
+    let options = CacheOptions {
+        block: BLOCK,
+        loading: Loading::Synchronous,
+        prefetch: Prefetch::Off,
+        ..CacheOptions::default()
+    };
+    let plan = Plan::new(&options, Plan::least(&options, 3) + 4, 3, 1, 1).expect("enough");
+    let layout = Layout::new([0, 0, 0, 60 * BLOCK, 0, 0], BLOCK);
+    let (blocks, loaders) = Blocks::new(layout, Box::new(Numbered), &options, &plan, 1).expect("starts");
+    let bring = |block: u32| drop(blocks.gather(&loaders, &[block], || ()).expect("there is no deadline"));
+    bring(7);
+    // It is given up while somebody may read it, who leaves; somebody else comes before it moves, and stays.
+    let [first, second] = [(); 2].map(|()| blocks.epochs.reader().expect("there is room"));
+    first.enter();
+    blocks.clear();
+    first.leave();
+    second.enter();
+    assert_eq!(blocks.move_in(), 1, "its place is its own until somebody takes it back");
+    blocks.clear();
+    bring(7);
+    second.leave();
+    assert!(blocks.reclaim(), "its first home goes now");
+    // SAFETY: it is here, and nobody else is.
+    assert_eq!(unsafe { *blocks.slots.at(7).cast::<u32>() }, 8);
+}

@@ -16,6 +16,7 @@ mod coarse;
 mod dispatch;
 mod kernel;
 mod lanes;
+mod many;
 mod packet;
 mod query;
 mod range;

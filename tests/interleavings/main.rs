@@ -42,6 +42,8 @@ mod quota;
 mod requests;
 #[path = "../../src/cache/retired.rs"]
 mod retired;
+#[path = "../../src/cache/room.rs"]
+mod room;
 #[path = "../../src/cache/slots.rs"]
 mod slots;
 #[path = "../../src/cache/source.rs"]

@@ -1,0 +1,99 @@
+//! Rays in slices, by the kernel named.
+
+use super::accel::{Accel, lanes_of};
+use super::kernel::Kernel;
+use super::lanes::{HitPacket, RayPacket};
+use super::tile::PACKETS;
+use super::width::PacketWidth;
+use crate::geometry::{Hit, Ray};
+
+impl Accel {
+    /// The closest hit of each ray, by the kernel named: for packets, rays that follow one
+    /// another go together. Panics if the slices' lengths differ.
+    pub fn intersect_many(&self, kernel: Kernel, rays: &[Ray], hits: &mut [Hit]) {
+        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
+        match kernel {
+            Kernel::Single => self.intersect_slices::<1>(rays, hits),
+            Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
+            Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
+            Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
+            Kernel::Stream if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
+            Kernel::Stream => self.intersect_stream(rays, hits),
+            Kernel::Tile => self.intersect_tiles(rays, hits),
+        }
+    }
+
+    /// Whether anything lies in each ray's interval, by the kernel named. Panics if the slices'
+    /// lengths differ.
+    pub fn occluded_many(&self, kernel: Kernel, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
+        match kernel {
+            Kernel::Single => self.occluded_slices::<1>(rays, occluded),
+            Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
+            Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
+            Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
+            Kernel::Stream if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
+            Kernel::Stream => self.occluded_stream(rays, occluded),
+            Kernel::Tile => self.occluded_tiles(rays, occluded),
+        }
+    }
+
+    fn intersect_slices<const W: usize>(&self, rays: &[Ray], hits: &mut [Hit])
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        for (rays, hits) in rays.chunks(W).zip(hits.chunks_mut(W)) {
+            let found = self.intersect_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = found.get(lane);
+            }
+        }
+    }
+
+    fn occluded_slices<const W: usize>(&self, rays: &[Ray], occluded: &mut [bool])
+    where
+        RayPacket<W>: PacketWidth<W>,
+    {
+        for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
+            let found = self.occluded_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
+            for (lane, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = found >> lane & 1 == 1;
+            }
+        }
+    }
+
+    fn intersect_tiles(&self, rays: &[Ray], hits: &mut [Hit]) {
+        for (rays, hits) in rays.chunks(PACKETS * 16).zip(hits.chunks_mut(PACKETS * 16)) {
+            let (packets, active) = packets_of(rays);
+            let mut found = [const { HitPacket::miss() }; PACKETS];
+            let count = rays.len().div_ceil(16);
+            self.intersect_tile(&packets[..count], &active[..count], &mut found[..count]);
+            for (i, hit) in hits.iter_mut().enumerate() {
+                *hit = found[i / 16].get(i % 16);
+            }
+        }
+    }
+
+    fn occluded_tiles(&self, rays: &[Ray], occluded: &mut [bool]) {
+        for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
+            let (packets, active) = packets_of(rays);
+            let mut found = [0; PACKETS];
+            let count = rays.len().div_ceil(16);
+            self.occluded_tile(&packets[..count], &active[..count], &mut found[..count]);
+            for (i, occluded) in occluded.iter_mut().enumerate() {
+                *occluded = found[i / 16] >> (i % 16) & 1 == 1;
+            }
+        }
+    }
+}
+
+/// Up to a tile's rays as packets, and the lanes that hold one.
+fn packets_of(rays: &[Ray]) -> ([RayPacket<16>; PACKETS], [u32; PACKETS]) {
+    let mut packets = [const { RayPacket::empty() }; PACKETS];
+    let mut active = [0; PACKETS];
+    for ((rays, packet), active) in rays.chunks(16).zip(&mut packets).zip(&mut active) {
+        *packet = RayPacket::of_slice(rays);
+        *active = lanes_of(rays.len());
+    }
+    (packets, active)
+}
