@@ -6,7 +6,7 @@
 
 use super::ahead::Ahead;
 use super::deadline::Deadline;
-use super::directory::{Asked, Directory, Pins};
+use super::directory::{Directory, Pins};
 use super::epoch::Epochs;
 use super::gate::Gate;
 use super::known::Known;
@@ -60,7 +60,7 @@ pub struct Blocks {
     pub ahead: Ahead,
     /// Whether blocks come with those that lie beside them.
     pub brings_others: bool,
-    quota: Quota,
+    pub(super) quota: Quota,
     pub(super) directories: [Option<Directory>; 2],
     source: Box<dyn Source>,
     /// Blocks given up that still have their slots.
@@ -81,10 +81,6 @@ pub struct Blocks {
     failure: Mutex<Option<Error>>,
     failed: AtomicBool,
 }
-
-/// Blocks were not here when the time was over.
-#[derive(Debug)]
-pub struct Late;
 
 impl Blocks {
     /// No block is here.
@@ -196,85 +192,6 @@ impl Blocks {
         let second = block as usize >= self.layout.first_of_leaves();
         let [first, other] = &self.directories;
         other.as_ref().filter(|_| second).or(first.as_ref()).expect("there is a first directory")
-    }
-
-    /// Pins blocks and has all of them come. The caller must be in no epoch.
-    ///
-    /// `aside` is called before anything is waited for that another thread may have to have a place at the
-    /// gate for: the caller must have none then.
-    ///
-    /// # Errors
-    /// The deadline has passed. What was asked for still comes.
-    pub fn gather(
-        &self,
-        loaders: &Loaders,
-        wanted: &[u32],
-        aside: impl FnOnce(),
-    ) -> Result<Gathered<'_>, Late> {
-        if self.deadline.has_passed() {
-            return Err(Late);
-        }
-        let mut aside = Some(aside);
-        let mut step_aside = || {
-            if let Some(aside) = aside.take() {
-                self.waits.fetch_add(1, Ordering::Relaxed);
-                aside();
-            }
-        };
-        let taken = self.quota.try_take(wanted.len()).unwrap_or_else(|| {
-            step_aside();
-            self.quota.take(wanted.len())
-        });
-        let mut gathered = Gathered { blocks: self, pinned: Vec::with_capacity(wanted.len()), taken };
-        let (mut absent, mut missed) = (Vec::new(), 0);
-        for &block in wanted {
-            let gone = &mut |gone| self.retire(gone);
-            let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
-            gathered.pinned.push(block);
-            missed += u64::from(asked != Asked::Here);
-            match asked {
-                // It may have come ahead of need since it was looked for.
-                Asked::Here => self.words.use_first(block as usize, self.tick()),
-                Asked::Coming => (),
-                Asked::Absent => absent.push(block),
-            }
-        }
-        if loaders.are_there() {
-            // What the system has in memory is copied sooner than it is asked for.
-            absent.retain(|&block| !self.load(block, true));
-        }
-        for &block in &absent {
-            if loaders.are_there() {
-                step_aside();
-                self.ahead.was_slow();
-            }
-            self.need(loaders, block);
-        }
-        add(&self.counters.misses, missed);
-        for &block in wanted {
-            while !self.words.is_here(block as usize) {
-                step_aside();
-                if !self.directory(block).wait(block, &self.deadline) {
-                    return Err(Late);
-                }
-                if self.words.is_here(block as usize) || self.has_failed() {
-                    break;
-                }
-                // It was to come ahead of need, and did not. Now it is needed.
-                let gone = &mut |gone| self.retire(gone);
-                if self.directory(block).ask(block, &self.words, &self.pins, gone) == Asked::Absent {
-                    self.need(loaders, block);
-                }
-            }
-        }
-        Ok(gathered)
-    }
-
-    /// Has a block come that the directory has said is absent: asks a loader for it, or reads it here if there is none.
-    fn need(&self, loaders: &Loaders, block: u32) {
-        if !loaders.need(block) {
-            self.load(block, false);
-        }
     }
 
     /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
@@ -418,20 +335,5 @@ impl Blocks {
         if !retired.has_homes() {
             self.slots.begin_anew();
         }
-    }
-}
-
-/// Blocks that are here and will be as long as this is.
-#[must_use]
-pub struct Gathered<'a> {
-    blocks: &'a Blocks,
-    pinned: Vec<u32>,
-    taken: usize,
-}
-
-impl Drop for Gathered<'_> {
-    fn drop(&mut self) {
-        self.pinned.iter().for_each(|&block| self.blocks.pins.unpin(block));
-        self.blocks.quota.give(self.taken);
     }
 }

@@ -1,4 +1,4 @@
-//! Threads that read blocks for others.
+//! Threads that read blocks for others, and what they leave to these.
 
 use super::blocks::Blocks;
 use super::requests::{Request, Requests};
@@ -20,7 +20,7 @@ impl Loaders {
     pub fn new(blocks: &Arc<Blocks>, count: usize, ahead: usize) -> std::io::Result<Self> {
         let mut loaders = Self::default();
         if count > 0 {
-            let requests = Arc::new(Requests::new(ahead));
+            let requests = Arc::new(Requests::new(count, ahead));
             loaders.requests = Some(Arc::clone(&requests));
             for number in 0..count {
                 let (blocks, requests) = (Arc::clone(blocks), Arc::clone(&requests));
@@ -34,6 +34,12 @@ impl Loaders {
     /// Whether there are any.
     pub fn are_there(&self) -> bool {
         self.requests.is_some()
+    }
+
+    /// Whether who needs a block is to read it himself, in whose place others go on: until what is returned is dropped.
+    /// `None` if it has to be asked for.
+    pub fn own(&self) -> Option<Own<'_>> {
+        self.requests.as_deref().filter(|requests| requests.try_own()).map(Own)
     }
 
     /// Asks for a block that the directory has said is absent, and waits while very many are asked for; whether there
@@ -77,15 +83,23 @@ impl Drop for Loaders {
     }
 }
 
+/// A read by who needs the block.
+#[derive(Debug)]
+pub struct Own<'a>(&'a Requests);
+
+impl Drop for Own<'_> {
+    fn drop(&mut self) {
+        self.0.done_own();
+    }
+}
+
 /// What a loader does.
 fn serve(blocks: &Blocks, requests: &Requests) {
     while let Some(request) = requests.next() {
         match request {
             Request::Needed(block) => blocks.load_with_others(block),
-            Request::Ahead(block) => {
-                blocks.load_ahead(block);
-                requests.done_ahead();
-            }
+            Request::Ahead(block) => blocks.load_ahead(block),
         }
+        requests.done(request);
     }
 }

@@ -15,7 +15,7 @@
 //!                  directory (a stripe's lock): pin, ask;  what must go is declared gone, and retired
 //!                  does the system have it in memory? then copy it, check, arrive
 //!                  else step aside ------------------------> another thread traces meanwhile
-//!                  loaders: room? read, check, arrive      (or the thread itself: synchronous loading)
+//!                  room? read, check, arrive               (one block by itself, others by loaders)
 //!                  wait; step back
 //!                  enter an epoch, unpin
 //! ```
@@ -31,7 +31,8 @@
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
 //! | `requests`, `loaders` | what loaders are asked for: first what is needed, then what may be needed soon |
 //! | `ahead`, `beside`, `glance` | blocks that come before they are needed, and which ones that may be |
-//! | `blocks`, `room` | all of these at work: asking, loading, giving up; memory for what comes |
+//! | `gather` | having blocks here that a walk needs all at once |
+//! | `blocks`, `room` | all of these at work: loading, giving up; memory for what comes |
 //! | `local`, `known`, `scraps` | a thread's state, what it has seen, what it has put together |
 //! | `part`, `view` | an array and the tree as a thread sees them |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
@@ -53,6 +54,7 @@ mod directory;
 mod epoch;
 mod file;
 mod gate;
+mod gather;
 mod glance;
 mod known;
 mod layout;
@@ -84,7 +86,8 @@ pub use view::View;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
-use blocks::{Blocks, Late};
+use blocks::Blocks;
+use gather::Late;
 use known::Known;
 use layout::Layout;
 use loaders::Loaders;

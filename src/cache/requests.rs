@@ -8,6 +8,10 @@
 //! who looks ahead --- ahead --> [ ahead  ]  when nothing is needed, and some loaders stay free
 //! ```
 //!
+//! Who needs a block reads it himself as long as nothing waits for a loader: to hand it over and to be told that it has
+//! come is to change threads twice more. That too counts among the reads that are under way, of which there are never more
+//! than loaders.
+//!
 //! A block that is asked for ahead of need has not been asked for in the [directory](super::directory) before a
 //! loader takes it: who needs it meanwhile asks for it as if nobody had, and goes first.
 
@@ -39,6 +43,8 @@ pub struct Requests {
     room: Condvar,
     /// Nothing is being read ahead of need any more.
     calm: Condvar,
+    /// Reads at a time.
+    loaders: usize,
     /// Blocks that are read ahead of need at a time.
     most: usize,
 }
@@ -47,19 +53,22 @@ pub struct Requests {
 struct State {
     needed: VecDeque<u32>,
     ahead: VecDeque<u32>,
+    /// Reads that are under way, whoever does them.
+    busy: usize,
     /// Blocks that are being read ahead of need.
     reading: usize,
     closed: bool,
 }
 
 impl Requests {
-    /// None yet; up to `most` blocks will be read ahead of need at a time.
-    pub fn new(most: usize) -> Self {
+    /// None yet; so many loaders will read, and up to `most` blocks ahead of need at a time.
+    pub fn new(loaders: usize, most: usize) -> Self {
         Self {
             state: Mutex::default(),
             work: Condvar::new(),
             room: Condvar::new(),
             calm: Condvar::new(),
+            loaders,
             most,
         }
     }
@@ -98,37 +107,63 @@ impl Requests {
         }
     }
 
-    /// What a loader is to read next, when there is something; `None` at the end.
+    /// Whether who needs a block may read it himself: nothing waits for a loader, and one is free. Then
+    /// [`done_own`](Self::done_own) is to be told.
+    pub fn try_own(&self) -> bool {
+        let mut state = self.state();
+        let may = state.needed.is_empty() && state.busy < self.loaders;
+        state.busy += usize::from(may);
+        may
+    }
+
+    /// Said when that is over.
+    pub fn done_own(&self) {
+        let mut state = self.state();
+        state.busy -= 1;
+        // It may have held something up.
+        if !state.needed.is_empty() || (!state.ahead.is_empty() && state.reading < self.most) {
+            self.work.notify_one();
+        }
+    }
+
+    /// What a loader is to read next, when there is something; `None` at the end. [`done`](Self::done) is to be told.
     pub fn next(&self) -> Option<Request> {
         let mut state = self.state();
         loop {
-            if let Some(block) = state.needed.pop_front() {
-                self.room.notify_one();
-                return Some(Request::Needed(block));
+            if state.busy < self.loaders {
+                if let Some(block) = state.needed.pop_front() {
+                    state.busy += 1;
+                    self.room.notify_one();
+                    return Some(Request::Needed(block));
+                }
+                if state.reading < self.most
+                    && let Some(block) = state.ahead.pop_front()
+                {
+                    state.busy += 1;
+                    state.reading += 1;
+                    return Some(Request::Ahead(block));
+                }
             }
-            if state.closed {
+            if state.closed && state.needed.is_empty() {
                 return None;
-            }
-            if state.reading < self.most
-                && let Some(block) = state.ahead.pop_front()
-            {
-                state.reading += 1;
-                return Some(Request::Ahead(block));
             }
             state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
-    /// Said when a block that was to be read ahead of need is here, or is not going to be.
-    pub fn done_ahead(&self) {
+    /// Said by a loader when a block is here, or is not going to be. It asks for the next one afterwards.
+    pub fn done(&self, request: Request) {
         let mut state = self.state();
-        state.reading -= 1;
-        // Who says so may go on with what is needed: another loader may have to take what is left.
-        if !state.ahead.is_empty() {
-            self.work.notify_one();
-        }
-        if state.reading == 0 {
-            self.calm.notify_all();
+        state.busy -= 1;
+        if let Request::Ahead(_) = request {
+            state.reading -= 1;
+            // Who says so may go on with what is needed: another loader may have to take what is left.
+            if !state.ahead.is_empty() {
+                self.work.notify_one();
+            }
+            if state.reading == 0 {
+                self.calm.notify_all();
+            }
         }
     }
 
@@ -166,7 +201,7 @@ mod tests {
 
     #[test]
     fn what_is_needed_goes_first_and_some_loaders_stay_free() {
-        let requests = Requests::new(2);
+        let requests = Requests::new(4, 2);
         requests.ahead(&[1, 2, 3, 2]);
         requests.need(7);
         let next = || requests.next().expect("it is not closed");
@@ -176,11 +211,10 @@ mod tests {
         assert_eq!(next(), Request::Needed(8));
         thread::scope(|scope| {
             let third = scope.spawn(next);
-            requests.done_ahead();
+            requests.done(Request::Ahead(1));
             assert_eq!(third.join().expect("no panic"), Request::Ahead(3));
         });
-        requests.done_ahead();
-        requests.done_ahead();
+        [2, 3].into_iter().for_each(|block| requests.done(Request::Ahead(block)));
         requests.forget_ahead();
         requests.ahead(&[4]);
         requests.need(9);
@@ -189,13 +223,39 @@ mod tests {
     }
 
     #[test]
+    fn there_are_never_more_reads_than_loaders() {
+        let requests = Requests::new(2, 1);
+        assert!(requests.try_own() && requests.try_own() && !requests.try_own());
+        requests.need(1);
+        thread::scope(|scope| {
+            let loader = scope.spawn(|| requests.next());
+            thread::sleep(std::time::Duration::from_millis(2));
+            assert!(!loader.is_finished());
+            // It is the loader's turn, not that of somebody who comes later.
+            requests.done_own();
+            assert_eq!(loader.join().expect("no panic"), Some(Request::Needed(1)));
+        });
+        assert!(!requests.try_own());
+        requests.done(Request::Needed(1));
+        requests.need(2);
+        assert!(!requests.try_own(), "something waits for a loader");
+        requests.ahead(&[3]);
+        requests.done_own();
+        let next = || requests.next().expect("it is not closed");
+        assert_eq!([next(), next()], [Request::Needed(2), Request::Ahead(3)]);
+        requests.close();
+        [Request::Needed(2), Request::Ahead(3)].into_iter().for_each(|request| requests.done(request));
+        assert_eq!(requests.next(), None);
+    }
+
+    #[test]
     fn the_oldest_are_forgotten_when_there_are_too_many() {
-        let requests = Requests::new(1);
+        let requests = Requests::new(1, 1);
         let blocks: Vec<u32> = (0..AHEAD as u32 + 10).collect();
         requests.ahead(&blocks);
         assert_eq!(requests.next(), Some(Request::Ahead(10)));
-        requests.done_ahead();
-        let none = Requests::new(0);
+        requests.done(Request::Ahead(10));
+        let none = Requests::new(1, 0);
         none.ahead(&blocks);
         none.close();
         assert_eq!(none.next(), None);

@@ -24,6 +24,8 @@ mod directory;
 mod epoch;
 #[path = "../../src/cache/gate.rs"]
 mod gate;
+#[path = "../../src/cache/gather.rs"]
+mod gather;
 #[path = "../../src/cache/known.rs"]
 mod known;
 #[path = "../../src/cache/layout.rs"]
