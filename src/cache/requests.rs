@@ -8,8 +8,8 @@
 //! who looks ahead --- ahead --> [ ahead  ]  when nothing is needed, and some loaders stay free
 //! ```
 //!
-//! Who needs a block reads it himself as long as nothing waits for a loader: to hand it over and to be told that it has
-//! come is to change threads twice more. That too counts among the reads that are under way, of which there are never more
+//! Who needs a block reads it himself as long as loaders are left over: to hand it over and to be told that it has come is
+//! to change threads twice more. That too counts among the reads that are under way, of which there are never more
 //! than loaders.
 //!
 //! A block that is asked for ahead of need has not been asked for in the [directory](super::directory) before a
@@ -107,11 +107,11 @@ impl Requests {
         }
     }
 
-    /// Whether who needs a block may read it himself: nothing waits for a loader, and one is free. Then
-    /// [`done_own`](Self::done_own) is to be told.
+    /// Whether who needs a block may read it himself: there is a loader for each that waits for one, and still another
+    /// one free. Then [`done_own`](Self::done_own) is to be told.
     pub fn try_own(&self) -> bool {
         let mut state = self.state();
-        let may = state.needed.is_empty() && state.busy < self.loaders;
+        let may = state.needed.len() + state.busy < self.loaders;
         state.busy += usize::from(may);
         may
     }
@@ -238,7 +238,7 @@ mod tests {
         assert!(!requests.try_own());
         requests.done(Request::Needed(1));
         requests.need(2);
-        assert!(!requests.try_own(), "something waits for a loader");
+        assert!(!requests.try_own(), "the loader that is free is for what waits");
         requests.ahead(&[3]);
         requests.done_own();
         let next = || requests.next().expect("it is not closed");

@@ -41,7 +41,7 @@ pub struct ShapeArgs {
     /// Locks that sets share
     #[arg(long, value_name = "N", default_value_t = CacheOptions::default().stripes)]
     stripes: usize,
-    /// Threads that read, if they are threads of their own
+    /// Reads at a time, with loading async: as many threads read what those who need it leave to them
     #[arg(long, value_name = "N", default_value_t = Loading::LOADERS)]
     loaders: usize,
     /// Read past the system's own memory of the file, so that a read takes what the disk takes (Linux)
