@@ -119,7 +119,7 @@ impl<'a> Lookahead<'a> {
     fn new(cached: &'a Cached, seen: Seen, tiles: Vec<Tile>, workers: &Workers, threads: usize) -> Self {
         let (ahead, runs) = match workers.sharing {
             Sharing::Queue => (QUEUE.map(|tiles| tiles * threads), 1),
-            Sharing::Runs => (RUNS, workers.threads.max(1)),
+            Sharing::Runs | Sharing::MirroredRuns => (RUNS, workers.threads.max(1)),
         };
         // In a picture of few tiles, not beyond the next ones.
         let ahead = ahead.map(|count| count.min(tiles.len() / 8).max(1));

@@ -249,8 +249,9 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 task.stand_in = Some(StandIn { cached, view, cost: &self.stand_in });
             }
         }
-        let jobs = self.jobs(&mut frame);
-        self.pass(&task, jobs, wanted, &mut outcome);
+        let backwards = self.goes_backwards();
+        let jobs = self.jobs(&mut frame, backwards);
+        self.pass(&task, jobs, backwards, wanted, &mut outcome);
 
         if let (Some(cached), Some(_)) = (self.accel.cached(), wanted.limit) {
             let stand_ins: u64 = outcome.states.iter().map(|scratch| scratch.stand_ins).sum();
@@ -264,7 +265,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             let mut jobs = frame.split(&self.tiles, tuning.tile);
             jobs.retain(|pixels| late.contains(&(pixels.tile.x, pixels.tile.y)));
             if !jobs.is_empty() {
-                self.pass(&task, jobs, wanted, &mut outcome);
+                self.pass(&task, jobs, false, wanted, &mut outcome);
             }
         }
         Drawn { first, frame, stats: self.stats(&outcome, threads, start.elapsed().as_secs_f64()) }
@@ -289,7 +290,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
             cached.begin_frame();
         }
         let mut frame = Frame::black(size, aovs);
-        let (workers, jobs) = (self.workers(), self.jobs(&mut frame));
+        let backwards = self.goes_backwards();
+        let (workers, jobs) = (self.workers(backwards), self.jobs(&mut frame, backwards));
         let lookahead = self.lookahead(&jobs, wanted.seen, &workers);
         let outcome = workers.run(
             jobs,
@@ -328,10 +330,14 @@ impl<'a, S: Surface> Renderer<'a, S> {
         Drawn { first: None, frame, stats }
     }
 
+    /// Whether a frame that begins goes from the last tile to the first. What the last frame has used last is there still:
+    /// this one begins with it.
+    fn goes_backwards(&self) -> bool {
+        self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some()
+    }
+
     /// A frame's tiles, in the order in which they are to be begun.
-    fn jobs<'f>(&self, frame: &'f mut Frame) -> Vec<TilePixels<'f>> {
-        // What the last frame has used last is there still: this one begins with it.
-        let backwards = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some();
+    fn jobs<'f>(&self, frame: &'f mut Frame, backwards: bool) -> Vec<TilePixels<'f>> {
         let mut jobs = frame.split(&self.tiles, self.settings.tuning.tile);
         if backwards {
             jobs.reverse();
@@ -360,8 +366,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
         Some(course.lookahead(seen, tiles, workers, self.settings.tuning.worker_count()))
     }
 
-    /// Who renders tiles.
-    fn workers(&self) -> Workers {
+    /// Who renders tiles, of which the last come first or not.
+    fn workers(&self, backwards: bool) -> Workers {
         let tuning = &self.settings.tuning;
         let threads = tuning.worker_count();
         match self.accel.cached() {
@@ -371,7 +377,11 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 // Where blocks have to go, tiles that are begun at about the same time are neighbours, so that they
                 // need the same ones. Where all have room, each worker has a part of the picture to itself, as
                 // in memory, and what is near it in its own caches.
-                let sharing = if cached.is_short() { Sharing::Queue } else { Sharing::Runs };
+                let sharing = match cached.is_short() {
+                    true => Sharing::Queue,
+                    false if backwards => Sharing::MirroredRuns,
+                    false => Sharing::Runs,
+                };
                 Workers { threads: cached.workers(threads), pin: false, sharing }
             }
         }
@@ -382,12 +392,13 @@ impl<'a, S: Surface> Renderer<'a, S> {
         &self,
         task: &TileTask<'_, S, W>,
         jobs: Vec<TilePixels<'_>>,
+        backwards: bool,
         wanted: &Wanted<'_>,
         all: &mut Outcome<Scratch<W>>,
     ) where
         RayPacket<W>: PacketWidth<W>,
     {
-        let workers = self.workers();
+        let workers = self.workers(backwards);
         let lookahead = self.lookahead(&jobs, wanted.seen, &workers);
         let outcome = workers.run(
             jobs,

@@ -21,8 +21,26 @@ pub enum Sharing {
     /// Each worker begins with a run of jobs that follow one another and does them in order; one that has
     /// none left steals from the far end of another's run, job by job.
     Runs,
+    /// The same, but the first worker begins with the last run. Where jobs come in reverse order every other time, each
+    /// worker then has those that it had before, and finds what they need in its processor's caches.
+    MirroredRuns,
     /// Each takes the first job that is left: all are near one another all the time.
     Queue,
+}
+
+impl Sharing {
+    /// The jobs that each of so many workers begins with.
+    fn deal<J>(self, jobs: Vec<J>, count: usize) -> Vec<Worker<J>> {
+        match self {
+            Self::Runs => shares(jobs, count),
+            Self::MirroredRuns => {
+                let mut shares = shares(jobs, count);
+                shares.reverse();
+                shares
+            }
+            Self::Queue => queue(jobs, count),
+        }
+    }
 }
 
 /// What is left when all jobs are done.
@@ -55,10 +73,7 @@ impl Workers {
         work: impl Fn(&mut S, J) + Sync,
     ) -> Outcome<S> {
         let threads = self.threads.max(1);
-        let deques = match self.sharing {
-            Sharing::Runs => shares(jobs, threads),
-            Sharing::Queue => queue(jobs, threads),
-        };
+        let deques = self.sharing.deal(jobs, threads);
         let stealers: Vec<Stealer<J>> = deques.iter().map(Worker::stealer).collect();
         let cores = if self.pin { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
 
@@ -139,7 +154,7 @@ mod tests {
 
     #[test]
     fn every_job_is_done_once() {
-        use Sharing::{Queue, Runs};
+        use Sharing::{MirroredRuns, Queue, Runs};
         for (threads, jobs, sharing) in [
             (1, 0, Runs),
             (1, 10, Runs),
@@ -147,6 +162,7 @@ mod tests {
             (3, 100, Runs),
             (16, 1000, Runs),
             (7, 6, Runs),
+            (3, 100, MirroredRuns),
             (1, 0, Queue),
             (16, 1000, Queue),
         ] {
@@ -193,6 +209,18 @@ mod tests {
             .collect();
         assert!(shares.iter().all(|s| (2..=3).contains(&s.len())), "{shares:?}");
         assert_eq!(shares.concat(), (0..10).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn mirrored_runs_are_of_the_same_jobs_backwards() {
+        let dealt = |sharing: Sharing, jobs: Vec<u32>| -> Vec<Vec<u32>> {
+            sharing.deal(jobs, 4).iter().map(|deque| std::iter::from_fn(|| deque.pop()).collect()).collect()
+        };
+        let there = dealt(Sharing::Runs, (0..12).collect());
+        let mut back = dealt(Sharing::MirroredRuns, (0..12).rev().collect());
+        assert_eq!(there[0], [0, 1, 2]);
+        back.iter_mut().for_each(|run| run.reverse());
+        assert_eq!(there, back);
     }
 
     #[test]

@@ -63,14 +63,14 @@ impl CachedSurface {
         })
     }
 
-    #[inline]
+    #[inline(always)]
     fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
         let corners = view.corners_of(primitive);
         let scale = self.cached.scale();
         if scale.is_none() { *corners } else { scale.undo(corners) }.map(Vec3::from_array)
     }
 
-    #[inline]
+    #[inline(always)]
     fn color_in(&self, view: &View<'_>, primitive: u32) -> FaceColor {
         match &self.paint {
             CachedPaint::PerMaterial(diffuse) => {
@@ -81,6 +81,7 @@ impl CachedSurface {
     }
 
     /// The colours where they are not the material's.
+    #[inline(always)]
     fn color_beside(&self, view: &View<'_>, primitive: u32) -> FaceColor {
         let at = |bytes: usize| primitive as usize * bytes;
         match &self.paint {
@@ -94,6 +95,7 @@ impl CachedSurface {
         }
     }
 
+    #[inline(always)]
     fn material_in(&self, view: &View<'_>, primitive: u32) -> u32 {
         if self.materials.is_empty() {
             return 0;
@@ -103,9 +105,11 @@ impl CachedSurface {
         self.in_range(u32::from_le_bytes(view.bytes(array, primitive as usize * bytes)))
     }
 
-    /// An index of a material as it was read: checksums were right, but nobody has looked at all of them.
+    /// An index of a material as it was read: checksums were right, but nobody has looked at all of them. The first one
+    /// stands for those that are out of range.
+    #[inline(always)]
     fn in_range(&self, material: u32) -> u32 {
-        material.checked_rem(self.materials.len() as u32).unwrap_or(0)
+        if (material as usize) < self.materials.len() { material } else { 0 }
     }
 
     fn detail_in(&self, view: &View<'_>, primitive: u32, u: f32, v: f32) -> Detail {
