@@ -3,8 +3,12 @@
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
+
+/// The temporary files that are being written.
+static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file through `fill`: into a temporary file beside the target, which takes the
 /// target's name when it is complete and on the disk. What `path` held before stays until then; on
@@ -23,7 +27,7 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::R
 /// [`Error::Write`], or what `fill` fails with.
 pub fn write_or<T>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<T>) -> Result<T> {
     let cannot = |source| Error::Write { path: path.into(), source };
-    let temporary = beside(path).map_err(cannot)?;
+    let (temporary, _listed) = beside(path).map_err(cannot)?;
     // The file itself: tempfile would put its own path into every error.
     let file = temporary.as_file().try_clone().map_err(cannot)?;
     let mut out = BufWriter::with_capacity(1 << 18, file);
@@ -49,9 +53,37 @@ pub fn check_writable(path: &Path) -> Result<()> {
             Ok(target) if target.is_dir() => return Err(io::Error::from(ErrorKind::IsADirectory)),
             _ => {}
         }
-        beside(path)?.close()
+        let (temporary, _listed) = beside(path)?;
+        temporary.close()
     };
     check().map_err(|source| Error::Write { path: path.into(), source })
+}
+
+/// Removes the temporary files that are being written, for a process that ends before they are complete. What is written
+/// to them afterwards is nowhere.
+pub fn abandon() {
+    // One that has its target's name by now is not found, and is complete.
+    drafts().drain(..).for_each(|draft| drop(fs::remove_file(draft)));
+}
+
+fn drafts() -> MutexGuard<'static, Vec<PathBuf>> {
+    DRAFTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A temporary file's place in the list.
+struct Listed(PathBuf);
+
+impl Listed {
+    fn new(draft: &Path) -> Self {
+        drafts().push(draft.into());
+        Self(draft.into())
+    }
+}
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        drafts().retain(|draft| *draft != self.0);
+    }
 }
 
 /// The folder that a file is in, or is to be in.
@@ -59,8 +91,8 @@ pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary file in the folder of `path`, which vanishes when dropped.
-fn beside(path: &Path) -> io::Result<NamedTempFile> {
+/// A temporary file in the folder of `path`, which vanishes when dropped, or with all that are [abandoned](abandon).
+fn beside(path: &Path) -> io::Result<(NamedTempFile, Listed)> {
     let folder = folder_of(path);
     let mut builder = tempfile::Builder::new();
     builder.prefix(".raypack-").suffix(".part");
@@ -71,13 +103,15 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     // tempfile puts its own path into the message; which file was asked for is in ours.
-    builder.tempfile_in(folder).map_err(|error| match error.kind() {
+    let temporary = builder.tempfile_in(folder).map_err(|error| match error.kind() {
         ErrorKind::NotFound => io::Error::new(
             ErrorKind::NotFound,
             format!("there is no folder {}; make it first", folder.display()),
         ),
         kind => kind.into(),
-    })
+    })?;
+    let listed = Listed::new(temporary.path());
+    Ok((temporary, listed))
 }
 
 /// Fills `into` with a file's bytes from an offset on. The file's own position means nothing, and on Windows

@@ -51,6 +51,26 @@ fn pictures_are_the_same_within_the_memory_given() {
 }
 
 #[test]
+fn several_processes_share_a_scene_file() {
+    let place = place(400_000);
+    place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));
+    let render = |name: &str| {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
+        command.current_dir(place.folder()).args(["render", "plant.rpk", "-o", name, "--memory", "48MiB"]);
+        command.args(VIEW.split(' ')).stdout(std::process::Stdio::null()).spawn().expect("it starts")
+    };
+    for mut render in ["one.png", "two.png", "three.png"].map(render) {
+        assert!(render.wait().expect("it ends").success());
+    }
+    for frame in 0..3 {
+        let whole = place.read(&format!("whole_00{frame}.png"));
+        for name in ["one", "two", "three"] {
+            assert!(place.read(&format!("{name}_00{frame}.png")) == whole, "{name}, frame {frame}");
+        }
+    }
+}
+
+#[test]
 fn what_comes_before_it_is_needed_changes_no_picture() {
     let place = place(400_000);
     place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));

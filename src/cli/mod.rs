@@ -13,6 +13,7 @@ mod effects;
 mod generate;
 mod histogram;
 mod info;
+mod interrupt;
 mod looks;
 mod model;
 mod options;
@@ -59,6 +60,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     log(cli.verbose);
+    interrupt::handle();
     let result = match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Build(args) => build::run(args),

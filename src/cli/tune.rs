@@ -1,5 +1,6 @@
 //! `raypack tune MODEL -o profile.toml`: the settings that suit a model and a machine.
 
+use super::interrupt;
 use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions};
 use super::outputs::same_file;
@@ -13,7 +14,7 @@ use crate::study::plot::Format;
 use crate::study::tune::{Load, Options, plot, run as search};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// The least time for a search, in minutes: less says nothing.
 const LEAST_MINUTES: f64 = 0.05;
@@ -73,16 +74,8 @@ pub fn run(args: &Args) -> Result<()> {
     }
 
     let stop = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&stop);
     // A second interrupt ends the process: the first one waits for runs of the candidate at hand.
-    let handled = ctrlc::set_handler(move || {
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = handled {
-        tracing::warn!("interrupting will not write the best so far: {error}");
-    }
+    interrupt::sets(&stop);
 
     let bar = Bar::new("tuning");
     let report = search(&model.name, &model.mesh, &start, &options, &stop, &mut |progress| {
