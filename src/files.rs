@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
+use std::mem;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
@@ -59,11 +60,13 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().map_err(|source| Error::Write { path: path.into(), source })
 }
 
-/// Removes the temporary files that are being written, for a process that ends before they are complete. What is written
-/// to them afterwards is nowhere.
+/// Removes the temporary files that are being written, for a process that ends at once, before they are complete. Who wants
+/// to begin another one, or is done with one, waits for that end.
 pub fn abandon() {
+    let mut drafts = drafts();
     // One that has its target's name by now is not found, and is complete.
-    drafts().drain(..).for_each(|draft| drop(fs::remove_file(draft)));
+    drafts.drain(..).for_each(|draft| drop(fs::remove_file(draft)));
+    mem::forget(drafts);
 }
 
 fn drafts() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -74,9 +77,13 @@ fn drafts() -> MutexGuard<'static, Vec<PathBuf>> {
 struct Listed(PathBuf);
 
 impl Listed {
-    fn new(draft: &Path) -> Self {
-        drafts().push(draft.into());
-        Self(draft.into())
+    /// Makes a temporary file that is in the list as long as there is one.
+    fn make(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<(NamedTempFile, Self)> {
+        let mut drafts = drafts();
+        let draft = make()?;
+        let path = draft.path().to_path_buf();
+        drafts.push(path.clone());
+        Ok((draft, Self(path)))
     }
 }
 
@@ -103,15 +110,13 @@ fn beside(path: &Path) -> io::Result<(NamedTempFile, Listed)> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     // tempfile puts its own path into the message; which file was asked for is in ours.
-    let temporary = builder.tempfile_in(folder).map_err(|error| match error.kind() {
+    Listed::make(|| builder.tempfile_in(folder)).map_err(|error| match error.kind() {
         ErrorKind::NotFound => io::Error::new(
             ErrorKind::NotFound,
             format!("there is no folder {}; make it first", folder.display()),
         ),
         kind => kind.into(),
-    })?;
-    let listed = Listed::new(temporary.path());
-    Ok((temporary, listed))
+    })
 }
 
 /// Fills `into` with a file's bytes from an offset on. The file's own position means nothing, and on Windows

@@ -54,17 +54,14 @@ fn pictures_are_the_same_within_the_memory_given() {
 fn several_processes_share_a_scene_file() {
     let place = place(400_000);
     place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));
-    let render = |name: &str| {
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
-        command.current_dir(place.folder()).args(["render", "plant.rpk", "-o", name, "--memory", "48MiB"]);
-        command.args(VIEW.split(' ')).stdout(std::process::Stdio::null()).spawn().expect("it starts")
-    };
-    for mut render in ["one.png", "two.png", "three.png"].map(render) {
-        assert!(render.wait().expect("it ends").success());
+    let names = ["one", "two", "three"];
+    let render = |name| place.process(&format!("render plant.rpk -o {name}.png --memory 48MiB {VIEW}"));
+    for mut process in names.map(|name| render(name).spawn().expect("it starts")) {
+        assert!(process.wait().expect("it ends").success());
     }
     for frame in 0..3 {
         let whole = place.read(&format!("whole_00{frame}.png"));
-        for name in ["one", "two", "three"] {
+        for name in names {
             assert!(place.read(&format!("{name}_00{frame}.png")) == whole, "{name}, frame {frame}");
         }
     }

@@ -217,11 +217,10 @@ fn a_profile_sets_what_the_options_leave_open() {
 #[test]
 #[cfg(unix)]
 fn a_closed_pipe_is_no_failure() {
-    use std::process::{Command, Stdio};
+    use std::process::Stdio;
     let place = house();
-    let mut child = Command::new(assert_cmd::cargo::cargo_bin("raypack"))
-        .current_dir(place.folder())
-        .args(["info", "house.ply"])
+    let mut child = place
+        .process("info house.ply")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

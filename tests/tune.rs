@@ -60,14 +60,11 @@ fn a_search_writes_a_profile_that_render_takes() {
 fn an_interrupted_search_writes_the_best_so_far() {
     use std::time::{Duration, Instant};
     let place = plant();
-    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
-    command.current_dir(place.folder()).args(["tune", "plant.ply", "-o", "mine.toml", "--size", "48x48"]);
-    command.args(["--minutes", "60", "--json", "r.json"]).stdout(std::process::Stdio::null());
-    let mut child = command.spawn().expect("it runs");
+    let tune = "tune plant.ply -o mine.toml --size 48x48 --minutes 60 --json r.json";
+    let mut child = place.process(tune).spawn().expect("it runs");
     // The handler is there once the model has been read; then an interrupt ends the search, not the process.
     std::thread::sleep(Duration::from_secs(3));
-    let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(interrupt.expect("kill runs").success());
+    assert!(common::signal(&child, "INT"));
     let since = Instant::now();
     let status = loop {
         match child.try_wait().expect("a status") {

@@ -377,10 +377,12 @@ impl<'a, S: Surface> Renderer<'a, S> {
                 // Where blocks have to go, tiles that are begun at about the same time are neighbours, so that they
                 // need the same ones. Where all have room, each worker has a part of the picture to itself, as
                 // in memory, and what is near it in its own caches.
-                let sharing = match cached.is_short() {
-                    true => Sharing::Queue,
-                    false if backwards => Sharing::MirroredRuns,
-                    false => Sharing::Runs,
+                let sharing = if cached.is_short() {
+                    Sharing::Queue
+                } else if backwards {
+                    Sharing::MirroredRuns
+                } else {
+                    Sharing::Runs
                 };
                 Workers { threads: cached.workers(threads), pin: false, sharing }
             }

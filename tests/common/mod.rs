@@ -6,7 +6,15 @@ use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
 use tempfile::TempDir;
+
+/// Sends a process a signal: `INT`, `KILL`. Whether it could be sent.
+pub fn signal(process: &Child, signal: &str) -> bool {
+    let arguments = [format!("-{signal}"), process.id().to_string()];
+    let sent = std::process::Command::new("kill").args(arguments).stderr(Stdio::null()).status();
+    sent.expect("kill runs").success()
+}
 
 /// A folder that is gone in the end.
 pub struct Place {
@@ -64,6 +72,14 @@ impl Place {
     pub fn raypack(&self, arguments: &str) -> Command {
         let mut command = Command::cargo_bin("raypack").expect("it was built");
         command.current_dir(self.folder()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
+        command
+    }
+
+    /// The same as a process of its own, which goes on beside the test and says nothing.
+    pub fn process(&self, arguments: &str) -> std::process::Command {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
+        command.current_dir(self.folder()).env_remove("RAYPACK_ISA").args(arguments.split_whitespace());
+        command.stdout(Stdio::null());
         command
     }
 

@@ -1,7 +1,7 @@
 //! Builds that are interrupted: the scene file is the old one or the new one, whenever it happens.
 
-use super::common::Place;
-use std::process::{Child, Command, Stdio};
+use super::common::{Place, signal};
+use std::process::{Child, Stdio};
 use std::thread;
 use std::time::Instant;
 
@@ -10,18 +10,19 @@ const WHEN: [u32; 8] = [0, 1, 3, 5, 7, 9, 11, 14];
 
 /// Begins to build a scene of a plant piece by piece, in the stead of what has its name.
 fn begin(place: &Place) -> Child {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("raypack"));
-    command.current_dir(place.folder()).args("build plant.ply -o scene.rpk --memory 120MiB".split(' '));
-    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts")
+    let mut build = place.process("build plant.ply -o scene.rpk --memory 120MiB");
+    build.stderr(Stdio::null()).spawn().expect("it starts")
 }
 
 /// Sends builds a signal at all of their stages, after which drafts may stay or may not. How many ended by it.
-fn interrupt(place: &Place, signal: &str, drafts_stay: bool) -> usize {
+fn interrupt(how: &str, drafts_stay: bool) -> usize {
+    let place = Place::new();
+    place.succeed("generate plant --triangles 400k --seed 5 -o plant.ply");
     place.succeed("generate plant --triangles 10k -o small.ply");
     place.succeed("build small.ply -o old.rpk");
     let build = |_| {
         let start = Instant::now();
-        assert!(begin(place).wait().expect("it ends").success());
+        assert!(begin(&place).wait().expect("it ends").success());
         start.elapsed()
     };
     let time = (0..3).map(build).min().expect("there are three");
@@ -29,40 +30,32 @@ fn interrupt(place: &Place, signal: &str, drafts_stay: bool) -> usize {
     for when in WHEN {
         std::fs::copy(place.path("old.rpk"), place.path("scene.rpk")).expect("copied");
         let before = place.files();
-        let mut build = begin(place);
+        let mut build = begin(&place);
         thread::sleep(time * when / 16);
-        let sent =
-            Command::new("kill").args([signal, &build.id().to_string()]).stderr(Stdio::null()).status();
-        sent.expect("kill runs");
+        signal(&build, how);
         if build.wait().expect("it ends").success() {
             place.succeed("info scene.rpk --verify");
         } else {
             interrupted += 1;
-            assert!(place.read("scene.rpk") == place.read("old.rpk"), "{signal} after {when}/16");
+            assert!(place.read("scene.rpk") == place.read("old.rpk"), "{how} after {when}/16");
         }
         let (drafts, others): (Vec<_>, Vec<_>) =
             place.files().into_iter().partition(|name| name.starts_with(".raypack-"));
-        assert_eq!(others, before, "{signal} after {when}/16");
-        assert!(drafts.is_empty() || drafts_stay, "{signal} after {when}/16: {drafts:?}");
+        assert_eq!(others, before, "{how} after {when}/16");
+        assert!(drafts.is_empty() || drafts_stay, "{how} after {when}/16: {drafts:?}");
         drafts.iter().for_each(|draft| std::fs::remove_file(place.path(draft)).expect("removed"));
     }
     interrupted
 }
 
-fn plant() -> Place {
-    let place = Place::new();
-    place.succeed("generate plant --triangles 400k --seed 5 -o plant.ply");
-    place
-}
-
 #[test]
 fn an_interrupted_build_leaves_the_old_file_and_nothing_else() {
-    let interrupted = interrupt(&plant(), "-INT", false);
+    let interrupted = interrupt("INT", false);
     assert!(interrupted >= 2, "{interrupted}");
 }
 
 #[test]
 fn a_killed_build_leaves_the_old_file() {
-    let interrupted = interrupt(&plant(), "-KILL", true);
+    let interrupted = interrupt("KILL", true);
     assert!(interrupted >= 2, "{interrupted}");
 }
