@@ -1,8 +1,8 @@
-//! An array that is owned, or lies in a mapped file.
+//! An array that is owned, or lies in a mapped file or in other memory that several share.
 //!
-//! A tree that was built owns its arrays; a tree out of a scene file has them where the file is mapped. Who
-//! reads them sees a slice either way, and pays for a pointer and a length: which of the two it is decides only
-//! who frees the memory.
+//! A tree that was built owns its arrays; a tree out of a scene file has them where the file is mapped, or where its blocks
+//! are once all of them have come. Who reads them sees a slice either way, and pays for a pointer and a length: which it is
+//! decides only who frees the memory.
 
 use bytemuck::AnyBitPattern;
 use memmap2::Mmap;
@@ -26,12 +26,12 @@ pub struct Column<T> {
 enum Owner {
     /// `start` is a vector's, and this is its capacity.
     Vector(usize),
-    /// `start` points into a map.
-    Map(#[expect(dead_code, reason = "held, never read")] Arc<Mmap>),
+    /// `start` points into what this keeps alive, as a map does its bytes.
+    Shared(#[expect(dead_code, reason = "held, never read")] Arc<dyn Send + Sync>),
 }
 
-// SAFETY: a column is a shared slice and the duty to free it: a vector's values may go where `T` may, and a
-// map's are only ever read.
+// SAFETY: a column is a shared slice and the duty to free it: a vector's values may go where `T` may, and those
+// that are shared are only ever read.
 unsafe impl<T: Send + Sync> Send for Column<T> {}
 // SAFETY: as above; nothing changes behind a shared reference that `T` does not change itself.
 unsafe impl<T: Sync> Sync for Column<T> {}
@@ -44,7 +44,22 @@ impl<T: AnyBitPattern> Column<T> {
     pub fn mapped(map: Arc<Mmap>, bytes: Range<usize>) -> Option<Self> {
         let values: &[T] = bytemuck::try_cast_slice(map.get(bytes)?).ok()?;
         let (start, len) = (NonNull::from(values).cast(), values.len());
-        Some(Self { start, len, owner: Owner::Map(map), values: PhantomData })
+        Some(Self { start, len, owner: Owner::Shared(map), values: PhantomData })
+    }
+
+    /// The values at a place in memory that `owner` keeps alive, and does not move.
+    ///
+    /// # Safety
+    /// So many values lie there, aligned, whenever the column is looked at, and nobody writes to them meanwhile.
+    pub unsafe fn in_memory(start: NonNull<T>, len: usize, owner: Arc<dyn Send + Sync>) -> Self {
+        Self { start, len, owner: Owner::Shared(owner), values: PhantomData }
+    }
+}
+
+impl<T: Send + Sync + 'static> From<Arc<Vec<T>>> for Column<T> {
+    fn from(values: Arc<Vec<T>>) -> Self {
+        let (start, len) = (NonNull::from(&values[..]).cast(), values.len());
+        Self { start, len, owner: Owner::Shared(values), values: PhantomData }
     }
 }
 
@@ -67,8 +82,8 @@ impl<T> Deref for Column<T> {
 
     #[inline(always)]
     fn deref(&self) -> &[T] {
-        // SAFETY: `start` and `len` are those of a vector's values or of a slice of a map; both live as long as
-        // `self.owner`, at a place that does not move with it, and nobody changes them.
+        // SAFETY: `start` and `len` are those of a vector's values, of a slice of a map, or of memory for which somebody
+        // has vouched; they live as long as `self.owner`, at a place that does not move with it, and nobody changes them.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), self.len) }
     }
 }
@@ -133,6 +148,19 @@ mod tests {
         assert_eq!(some[..], [[4, 9], [16, 25]]);
         assert!(held.upgrade().is_some());
         drop(some);
+        assert!(held.upgrade().is_none());
+    }
+
+    #[test]
+    fn shared_values_live_as_long_as_one_of_their_columns() {
+        let values = Arc::new(vec![3_u32, 1, 4]);
+        let held = Arc::downgrade(&values);
+        let [one, other] = [Arc::clone(&values), values].map(Column::from);
+        // SAFETY: the second and the third of these values, which nobody changes.
+        let part = unsafe { Column::in_memory(NonNull::from(&one[1]), 2, held.upgrade().expect("held")) };
+        drop((one, other));
+        assert_eq!(part[..], [1, 4]);
+        drop(part);
         assert!(held.upgrade().is_none());
     }
 

@@ -41,7 +41,7 @@ impl Blocks {
 
     /// The blocks around one that is about to be read that are absent as well, have room, and from now on are this
     /// thread's to read.
-    fn claim_beside(&self, block: u32) -> Range<u32> {
+    pub(super) fn claim_beside(&self, block: u32) -> Range<u32> {
         // From a multiple of as many bytes on.
         let near = self.layout.beside(block, READ);
         let end = (block + 1..near.end).find(|&other| !self.claim(other)).unwrap_or(near.end);
@@ -50,7 +50,7 @@ impl Blocks {
     }
 
     /// Whether a block is now this thread's to read, and there is room for it.
-    fn claim(&self, block: u32) -> bool {
+    pub(super) fn claim(&self, block: u32) -> bool {
         let directory = self.directory(block);
         if !directory.claim(block, &self.words) {
             return false;

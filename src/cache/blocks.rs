@@ -21,6 +21,7 @@ use super::slots::Slots;
 use super::source::Source;
 use super::stats::{CacheStats, Counters, add, nanos};
 use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, Ordering, PoisonError};
+use super::whole::Whole;
 use super::words::Words;
 use crate::error::Error;
 use std::ops::Range;
@@ -78,6 +79,7 @@ pub struct Blocks {
     pub waits: AtomicU32,
     /// When threads stop waiting.
     pub deadline: Deadline,
+    pub(super) whole: Whole,
     failure: Mutex<Option<Error>>,
     failed: AtomicBool,
 }
@@ -123,6 +125,7 @@ impl Blocks {
             frame_tick: AtomicU32::new(0),
             waits: AtomicU32::new(0),
             deadline: Deadline::default(),
+            whole: Whole::default(),
             failure: Mutex::default(),
             failed: AtomicBool::new(false),
             layout,
@@ -153,9 +156,16 @@ impl Blocks {
         was_short
     }
 
+    /// Whether nothing ever has to go.
+    pub fn holds_all(&self) -> bool {
+        self.holds_all
+    }
+
     /// From now on, writes uses down, or no longer does. Where nothing ever has to go, it is enough to know which blocks
     /// were used at all.
     pub fn trace_uses(&self, on: bool) {
+        // Of a scene that is whole, uses are not noticed.
+        self.whole.end();
         self.words.trace_uses(on, !self.holds_all);
     }
 
@@ -211,11 +221,13 @@ impl Blocks {
         self.gone.load(Ordering::Relaxed) as usize > self.limit / FEW
     }
 
-    /// The same of a block that went for nothing that is needed: memory is not short for that.
+    /// The same of a block that went for nothing that is needed: memory is not short for that. It has been
+    /// [declared gone](Words::leave).
     pub fn let_go(&self, gone: u32) {
         // Before the epoch ends: who enters a later one knows it.
         self.slots.leave_order(|| self.epochs.retire());
         let mut retired = self.retired();
+        self.whole.end();
         retired.push(self.epochs.retire(), gone);
     }
 
@@ -329,6 +341,7 @@ impl Blocks {
             directory.clear(&self.words, &self.pins, &mut |gone| self.retire(gone));
         }
         self.ahead.clear();
+        self.whole.begin_anew();
         self.reclaim();
         let retired = self.retired();
         // A home whose block has moved is somebody's as long as it waits to be left.

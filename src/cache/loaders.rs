@@ -55,6 +55,13 @@ impl Loaders {
         }
     }
 
+    /// Asks for as much of what nobody has asked for as [may come](Blocks::allow_rest); never waits.
+    pub fn rest(&self) {
+        if let Some(requests) = &self.requests {
+            requests.rest();
+        }
+    }
+
     /// Waits until all that was asked for ahead of need has come, or has not.
     #[cfg(test)]
     pub fn wait_ahead(&self) {
@@ -99,6 +106,11 @@ fn serve(blocks: &Blocks, requests: &Requests) {
         match request {
             Request::Needed(block) => blocks.load_with_others(block),
             Request::Ahead(block) => blocks.load_ahead(block),
+            Request::Rest => {
+                if !blocks.load_rest_of_frame() {
+                    requests.rest_has_come();
+                }
+            }
         }
         requests.done(request);
     }

@@ -4,7 +4,8 @@
 //! about them lie in a file and come in *blocks* when a walk is about to look at them: the kernels say so beforehand
 //! ([`Tree::children`](crate::kdtree::Tree::children), [`Tree::enter_leaf`](crate::kdtree::Tree::enter_leaf)), and a
 //! [`View`] of the tree sees to it that the blocks are here.
-//! For a resident tree that call is empty: the kernels are compiled for each.
+//! For a resident tree that call is empty: the kernels are compiled for each. Where there is room for all blocks and all
+//! have come, a tree is resident.
 //!
 //! ```text
 //! kernel -- enter --> words: here? ---- yes --> go on (one load for each block)
@@ -35,6 +36,7 @@
 //! | `blocks`, `room` | all of these at work: loading, giving up; memory for what comes |
 //! | `local`, `known`, `scraps` | a thread's state, what it has seen, what it has put together |
 //! | `part`, `view` | an array and the tree as a thread sees them |
+//! | `whole`, `in_homes` | where there is room for all blocks and all have come: a tree like any other |
 //! | `plan`, `sync` | how the memory is divided; what threads share |
 //! | `source`, `pieces`, `file`, `at_once` | where blocks come from |
 //!
@@ -56,6 +58,7 @@ mod file;
 mod gate;
 mod gather;
 mod glance;
+mod in_homes;
 mod known;
 mod layout;
 mod loaders;
@@ -74,6 +77,7 @@ mod source;
 mod stats;
 mod sync;
 mod view;
+mod whole;
 mod words;
 
 pub(crate) use glance::Glance;
@@ -83,19 +87,22 @@ pub use source::Source;
 pub use stats::CacheStats;
 pub use view::View;
 
+use crate::column::Column;
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
-use crate::kdtree::{Node, SPREAD_BLOCKS, Scale};
+use crate::kdtree::{KdTree, Node, SPREAD_BLOCKS, Scale};
 use blocks::Blocks;
 use gather::Late;
+use in_homes::InHomes;
 use known::Known;
 use layout::Layout;
 use loaders::Loaders;
 use local::Local;
 use scraps::Scraps;
+use std::mem;
 use std::panic::{self, AssertUnwindSafe};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use view::Unreadable;
 
@@ -125,14 +132,18 @@ pub struct Cached {
     scale: Scale,
     bounds: Aabb,
     root: Node,
-    upper: Vec<Node>,
-    beneath: Vec<u32>,
+    upper: Column<Node>,
+    beneath: Column<u32>,
+    /// The tree in the blocks' homes, where there is room for all.
+    in_homes: Option<InHomes>,
     options: CacheOptions,
     plan: Plan,
     /// Whether the last frame had to give blocks up.
     was_short: AtomicBool,
     /// How often threads waited in the last frame; more than ever before the first.
     waited: AtomicU32,
+    /// When the last frame began.
+    begun: Mutex<Instant>,
     blocks: Arc<Blocks>,
     loaders: Loaders,
 }
@@ -195,7 +206,53 @@ impl Cached {
         blocks.waits.store(MANY, Ordering::Relaxed);
         let (was_short, waited) = (AtomicBool::new(false), AtomicU32::new(MANY));
         let options = *options;
-        Ok(Self { scale, bounds, root, upper, beneath, options, plan, was_short, waited, blocks, loaders })
+        let (upper, beneath) = (Arc::new(upper), Arc::new(beneath));
+        let in_homes = InHomes::new(&blocks, &upper, &beneath, bounds, scale);
+        let (upper, beneath) = (upper.into(), beneath.into());
+        Ok(Self {
+            scale,
+            bounds,
+            root,
+            upper,
+            beneath,
+            in_homes,
+            options,
+            plan,
+            was_short,
+            waited,
+            begun: Mutex::new(Instant::now()),
+            blocks,
+            loaders,
+        })
+    }
+
+    /// The tree of a scene that is [whole](Blocks::is_whole), for who is in an epoch in which it is.
+    fn whole(&self) -> &KdTree {
+        self.in_homes.as_ref().expect("it has homes").tree()
+    }
+
+    /// Whether there is room for all blocks, so that none ever has to go.
+    pub fn holds_all(&self) -> bool {
+        self.blocks.holds_all()
+    }
+
+    /// Has all blocks come that are not here, where there is room for all. Uses nothing, and waits for no other thread.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn fill(&self) -> Result<()> {
+        if !self.blocks.holds_all() {
+            return Ok(());
+        }
+        self.blocks.whole.begin_anew();
+        while self.blocks.load_rest()? > 0 {}
+        Ok(())
+    }
+
+    /// Whether all blocks were here when the last frame began: then it was traced as scenes are that are all in memory, and
+    /// no uses were counted.
+    pub fn is_whole(&self) -> bool {
+        self.blocks.is_whole()
     }
 
     /// What was chosen.
@@ -237,11 +294,20 @@ impl Cached {
         if is_calm { threads } else { self.options.loading.workers(threads) }
     }
 
-    /// Begins a frame.
+    /// Begins a frame. Where there is room for all, blocks may come before they are needed, and half of them have come, the
+    /// others follow by and by.
     pub fn begin_frame(&self) {
         self.was_short.store(self.blocks.begin_frame(), Ordering::Relaxed);
-        self.waited.store(self.blocks.waits.swap(0, Ordering::Relaxed), Ordering::Relaxed);
+        let since =
+            mem::replace(&mut *self.begun.lock().unwrap_or_else(PoisonError::into_inner), Instant::now());
+        let waited = self.blocks.waits.swap(0, Ordering::Relaxed);
+        self.waited.store(waited, Ordering::Relaxed);
         self.blocks.ahead.begin_frame();
+        let brings_others = self.options.prefetch != Prefetch::Off;
+        if !self.blocks.look_whether_whole() && brings_others && self.blocks.lacks_few() {
+            self.blocks.allow_rest(since.elapsed().as_secs_f64());
+            self.loaders.rest();
+        }
     }
 
     /// Whether it pays to look ahead: blocks may come before they are needed, and some had to be waited for, in

@@ -6,6 +6,8 @@
 //!                                               next --> loaders
 //!                                              /
 //! who looks ahead --- ahead --> [ ahead  ]  when nothing is needed, and some loaders stay free
+//!                                              /
+//! where there is room for all  - rest --> the rest  when nothing else is to be done, by one loader
 //! ```
 //!
 //! Who needs a block reads it himself as long as loaders are left over: to hand it over and to be told that it has come is
@@ -31,6 +33,8 @@ pub enum Request {
     Needed(u32),
     /// One that may be needed soon. [`Requests::done_ahead`] is told when it is here, or not.
     Ahead(u32),
+    /// Some of those that are not here and that nobody has asked for.
+    Rest,
 }
 
 /// The requests of one cache.
@@ -57,7 +61,17 @@ struct State {
     busy: usize,
     /// Blocks that are being read ahead of need.
     reading: usize,
+    /// Whether the rest is to come, and whether a loader is bringing some of it.
+    rest: bool,
+    bringing: bool,
     closed: bool,
+}
+
+impl State {
+    /// Whether nothing is being read that nobody waits for.
+    fn is_calm(&self) -> bool {
+        self.reading == 0 && !self.bringing
+    }
 }
 
 impl Requests {
@@ -107,6 +121,20 @@ impl Requests {
         }
     }
 
+    /// Asks for blocks that are not here yet, whichever they are.
+    pub fn rest(&self) {
+        let mut state = self.state();
+        if !state.rest && !state.closed {
+            state.rest = true;
+            self.work.notify_one();
+        }
+    }
+
+    /// Said by the loader that brings them, before it is done, when there are no more to bring.
+    pub fn rest_has_come(&self) {
+        self.state().rest = false;
+    }
+
     /// Whether who needs a block may read it himself: there is a loader for each that waits for one, and still another
     /// one free. Then [`done_own`](Self::done_own) is to be told.
     pub fn try_own(&self) -> bool {
@@ -121,7 +149,8 @@ impl Requests {
         let mut state = self.state();
         state.busy -= 1;
         // It may have held something up.
-        if !state.needed.is_empty() || (!state.ahead.is_empty() && state.reading < self.most) {
+        let has_ahead = !state.ahead.is_empty() && state.reading < self.most;
+        if !state.needed.is_empty() || has_ahead || state.rest && !state.bringing {
             self.work.notify_one();
         }
     }
@@ -143,6 +172,12 @@ impl Requests {
                     state.reading += 1;
                     return Some(Request::Ahead(block));
                 }
+                // Another one stays free for what is needed.
+                if state.rest && !state.bringing && (state.busy == 0 || state.busy + 1 < self.loaders) {
+                    state.bringing = true;
+                    state.busy += 1;
+                    return Some(Request::Rest);
+                }
             }
             if state.closed && state.needed.is_empty() {
                 return None;
@@ -155,15 +190,17 @@ impl Requests {
     pub fn done(&self, request: Request) {
         let mut state = self.state();
         state.busy -= 1;
-        if let Request::Ahead(_) = request {
-            state.reading -= 1;
-            // Who says so may go on with what is needed: another loader may have to take what is left.
-            if !state.ahead.is_empty() {
-                self.work.notify_one();
-            }
-            if state.reading == 0 {
-                self.calm.notify_all();
-            }
+        match request {
+            Request::Needed(_) => return,
+            Request::Ahead(_) => state.reading -= 1,
+            Request::Rest => state.bringing = false,
+        }
+        // Who says so may go on with what is needed: another loader may have to take what is left.
+        if !state.ahead.is_empty() || state.rest {
+            self.work.notify_one();
+        }
+        if state.is_calm() {
+            self.calm.notify_all();
         }
     }
 
@@ -171,7 +208,8 @@ impl Requests {
     pub fn forget_ahead(&self) {
         let mut state = self.state();
         state.ahead.clear();
-        while state.reading > 0 {
+        state.rest = false;
+        while !state.is_calm() {
             state = self.calm.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
@@ -180,7 +218,7 @@ impl Requests {
     #[cfg(test)]
     pub fn wait_ahead(&self) {
         let mut state = self.state();
-        while state.reading > 0 || !state.ahead.is_empty() {
+        while !state.is_calm() || !state.ahead.is_empty() || state.rest {
             state = self.calm.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
@@ -190,6 +228,7 @@ impl Requests {
         let mut state = self.state();
         state.closed = true;
         state.ahead.clear();
+        state.rest = false;
         self.work.notify_all();
     }
 }

@@ -149,6 +149,11 @@ impl Slots {
         self.in_order.load(Ordering::SeqCst)
     }
 
+    /// Whether there is room for all blocks, at their homes.
+    pub fn hold_all(&self) -> bool {
+        self.homes == Homes::Always
+    }
+
     /// Where a byte of all blocks lies as long as they are in order.
     pub fn home(&self, byte: usize) -> *const u8 {
         self.place(self.nowhere + 1).wrapping_add(byte)

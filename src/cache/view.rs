@@ -8,7 +8,7 @@ use super::slots::Slots;
 use super::words::Words;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
-use crate::kdtree::{Node, Scale, Tree};
+use crate::kdtree::{KdTree, Node, Scale, Tree};
 use crate::simd::prefetch;
 use std::cell::Cell;
 use std::ops::Range;
@@ -33,6 +33,8 @@ pub struct View<'a> {
     surfaces: Part<u8>,
     /// Whether all blocks lie in memory as they do in their arrays: see [`Slots`].
     in_order: Cell<bool>,
+    /// Whether all of them are here, and stay.
+    is_whole: bool,
     shift: u32,
     tick: u32,
     local: Option<Box<Local>>,
@@ -61,10 +63,18 @@ impl<'a> View<'a> {
             surfaces: Part::new(blocks, Array::Surfaces),
             // In its epoch by now.
             in_order: Cell::new(blocks.slots.are_in_order()),
+            is_whole: blocks.is_whole(),
             shift: blocks.layout.shift(),
             tick: blocks.tick(),
             local: Some(local),
         }
+    }
+
+    /// The tree, if it is all in memory: then kernels need not ask this view for anything.
+    #[inline(always)]
+    pub(crate) fn whole(&self) -> Option<&KdTree> {
+        // This view stays in its epoch, where nothing is waited for.
+        self.is_whole.then(|| self.cached.whole())
     }
 
     fn local(&self) -> &Local {
@@ -330,9 +340,13 @@ impl<'a> View<'a> {
     /// A triangle's corners, entered. Panics if there is no such triangle.
     #[inline(always)]
     pub fn corners_of(&self, primitive: u32) -> &Corners {
-        self.forget_copies();
         let primitive = primitive as usize;
         assert!(primitive < self.triangles.count, "there are {} triangles", self.triangles.count);
+        if self.is_whole {
+            // SAFETY: as in `slice`: all blocks are here, at their homes.
+            return unsafe { &(*self.triangles.place(primitive).cast::<Triangle>()).corners };
+        }
+        self.forget_copies();
         // SAFETY: as in `slice`.
         let [triangle]: &[Triangle; 1] = unsafe { &*self.enter_elements(&self.triangles, primitive) };
         &triangle.corners
@@ -348,6 +362,10 @@ impl<'a> View<'a> {
             other => unreachable!("{} are no bytes", other.name()),
         };
         assert!(first + N <= part.count, "{} has {} bytes", array.name(), part.count);
+        if self.is_whole {
+            // SAFETY: as in `slice`: all blocks are here, at their homes.
+            return unsafe { *part.place(first).cast() };
+        }
         // SAFETY: as in `slice`.
         unsafe { *self.enter_elements(part, first) }
     }

@@ -115,7 +115,7 @@ impl Words {
 
     /// Whether a use is written down, which may be a block's first one since it came.
     fn is_traced(&self, is_first: bool) -> bool {
-        self.is_tracing_all() || is_first && self.tracing.load(Ordering::Relaxed)
+        self.is_tracing_all() || is_first && self.is_tracing()
     }
 
     /// Takes over what a thread has noted, with so many first uses more, which were of lists that are known to be here.
@@ -155,6 +155,11 @@ impl Words {
     /// Whether all first uses in a tick are being noted down.
     fn is_tracing_all(&self) -> bool {
         self.tracing_all.load(Ordering::Relaxed)
+    }
+
+    /// Whether any uses are being noted down.
+    pub fn is_tracing(&self) -> bool {
+        self.tracing.load(Ordering::Relaxed)
     }
 
     /// First uses in a tick since the last call.

@@ -22,6 +22,7 @@ pub use build::BuildProgress;
 pub use lines::{Exit, Line};
 pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
+pub(crate) use parts::Walked;
 pub use parts::{Arrays, Parts};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};

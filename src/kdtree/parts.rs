@@ -97,6 +97,47 @@ impl KdTree {
     }
 }
 
+/// What is needed of a tree to trace packets and beams through it.
+#[derive(Debug)]
+pub(crate) struct Walked {
+    /// See [`Arrays::nodes`].
+    pub nodes: Column<Node>,
+    /// See [`Arrays::references`].
+    pub references: Column<u32>,
+    /// See [`Arrays::upper`].
+    pub upper: Column<Node>,
+    /// See [`Arrays::beneath`].
+    pub beneath: Column<u32>,
+    /// See [`Arrays::pages`].
+    pub pages: Column<u32>,
+    /// See [`Arrays::triangles`].
+    pub triangles: Column<Triangle>,
+    /// See [`Parts::bounds`].
+    pub bounds: Aabb,
+    /// See [`Parts::scale`].
+    pub scale: Scale,
+}
+
+impl From<Walked> for KdTree {
+    /// A tree without lines, which streams of rays are traced through, and without what was known when it was built. Of its
+    /// arrays, nothing is looked at.
+    fn from(walked: Walked) -> Self {
+        let Walked { nodes, references, upper, beneath, pages, triangles, bounds, scale } = walked;
+        Self {
+            nodes,
+            references,
+            lines: Lines::of_packed(Column::default()),
+            pages: Pages { upper, beneath, primitives: pages },
+            triangles,
+            bounds,
+            scale,
+            params: BuildParams::default(),
+            build_peak: 0,
+            stats: OnceLock::new(),
+        }
+    }
+}
+
 impl Parts {
     fn check(&self) -> Result<(), String> {
         let count = self.triangles.len();

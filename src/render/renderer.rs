@@ -10,6 +10,7 @@ use super::settings::RenderSettings;
 use super::shade::Shader;
 use super::stats::{FrameStats, RayCount, Tally, quantile};
 use super::tile::{Calls, Scratch, TileTask, squares};
+use crate::cache::Cached;
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::scene::effects::Effect;
@@ -330,10 +331,16 @@ impl<'a, S: Surface> Renderer<'a, S> {
         Drawn { first: None, frame, stats }
     }
 
+    /// The scene, if not all of it is in memory.
+    fn partial(&self) -> Option<&Cached> {
+        self.accel.cached().map(|cached| &**cached).filter(|cached| !cached.is_whole())
+    }
+
     /// Whether a frame that begins goes from the last tile to the first. What the last frame has used last is there still:
     /// this one begins with it.
     fn goes_backwards(&self) -> bool {
-        self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1 && self.accel.cached().is_some()
+        let is_odd = self.frames.fetch_add(1, Ordering::Relaxed) % 2 == 1;
+        is_odd && self.partial().is_some()
     }
 
     /// A frame's tiles, in the order in which they are to be begun.
@@ -370,7 +377,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
     fn workers(&self, backwards: bool) -> Workers {
         let tuning = &self.settings.tuning;
         let threads = tuning.worker_count();
-        match self.accel.cached() {
+        match self.partial() {
             None => Workers { threads, pin: tuning.pin, sharing: Sharing::Runs },
             // Some wait for their blocks while others are at work.
             Some(cached) => {

@@ -161,7 +161,11 @@ impl Accel {
     /// The same for a scene that is all in memory. Panics if it is not.
     #[inline(always)]
     pub(super) fn ask_resident<Q: Query>(&self, query: Q) -> Q::Output {
-        let tree = self.tree();
+        self.ask_tree(self.tree(), query)
+    }
+
+    #[inline(always)]
+    fn ask_tree<Q: Query>(&self, tree: &KdTree, query: Q) -> Q::Output {
         let triangles = Resident { tree, records: tree.triangles() };
         match self.accuracy {
             Accuracy::Fast => {
@@ -191,6 +195,9 @@ impl Accel {
     /// The same for a scene that is in memory in part.
     fn ask_cached<Q: Query>(&self, cached: &Cached, query: Q) -> Q::Output {
         let tree = cached.view();
+        if let Some(tree) = tree.whole() {
+            return self.ask_tree(tree, query);
+        }
         match self.accuracy {
             Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &tree)),
             Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &tree)),

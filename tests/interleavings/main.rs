@@ -52,6 +52,8 @@ mod slots;
 mod source;
 #[path = "../../src/cache/stats.rs"]
 mod stats;
+#[path = "../../src/cache/whole.rs"]
+mod whole;
 #[path = "../../src/cache/words.rs"]
 mod words;
 
@@ -76,7 +78,7 @@ use std::env;
 use std::time::Instant;
 
 /// What is tried, and in how many schedules.
-const CHECKS: [(&str, fn(), usize); 16] = [
+const CHECKS: [(&str, fn(), usize); 18] = [
     ("blocks are whole for as long as they are read", scenes::blocks_are_whole, 1500),
     ("the same in sets of one block", scenes::sets_of_one, 1500),
     ("a block may be asked for while it goes", scenes::asked_for_again, 6000),
@@ -88,6 +90,8 @@ const CHECKS: [(&str, fn(), usize); 16] = [
     ("what cannot come ahead of need is no error", scenes::ahead_fails, 1500),
     ("blocks come with those beside them", scenes::beside, 3000),
     ("one that cannot come is no error for those beside it", scenes::beside_fails, 1500),
+    ("a whole scene is whole for as long as it is read", scenes::all_goes, 6000),
+    ("a scene becomes whole, and is no longer", scenes::whole_and_not, 3000),
     ("loaders end whatever was asked for ahead of need", scenes::ahead_at_the_end, 1500),
     ("what is retired is freed when nobody reads it", scenes::epochs_hold, 3000),
     ("what is known to be here can be read", scenes::known_lists_hold, 6000),

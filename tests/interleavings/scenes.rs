@@ -95,7 +95,7 @@ fn read(blocks: &Blocks, loaders: &Loaders, wanted: &[u32]) -> bool {
         return false;
     }
     // As kernels do, without a look at the table if there seems to be no need of it.
-    let in_order = blocks.slots.are_in_order();
+    let (in_order, is_whole) = (blocks.slots.are_in_order(), blocks.is_whole());
     let find = |block: usize| {
         if in_order { blocks.slots.home(block * BLOCK) } else { blocks.slots.at(block) }
     };
@@ -109,6 +109,9 @@ fn read(blocks: &Blocks, loaders: &Loaders, wanted: &[u32]) -> bool {
         wanted.iter().map(|&block| (block as usize, find(block as usize))).collect();
     for _ in 0..2 {
         found.iter().for_each(|&(block, place)| look(block, place));
+        if is_whole {
+            (0..BLOCKS).for_each(|block| look(block, blocks.slots.home(block * BLOCK)));
+        }
         thread::yield_now();
     }
     // What others have brought meanwhile is good, too.
@@ -275,6 +278,70 @@ pub fn beside_fails() {
     assert!(came == [2, 1] && !has_failed, "nobody needed what could not be read");
     let (came, has_failed) = play_beside(4, Some(2), &[&[&[1]], &[&[2]]]);
     assert!(came[1] == 0 && has_failed, "{came:?}");
+}
+
+pub fn all_goes() {
+    all_goes_while_it_is_looked_at(true);
+    all_goes_while_it_is_looked_at(false);
+}
+
+/// All of a scene goes, which may be known to be whole by then, while somebody looks whether it is, and somebody else relies
+/// on it.
+fn all_goes_while_it_is_looked_at(is_known: bool) {
+    let (blocks, _) = cache(BLOCKS, Replacement::Lru, None);
+    while blocks.load_rest().expect("all can be read") > 0 {}
+    assert!(!is_known || blocks.look_whether_whole(), "there is room for all");
+    let reader = {
+        let blocks = Arc::clone(&blocks);
+        thread::spawn(move || {
+            let reader = blocks.epochs.reader().expect("there is room");
+            reader.enter();
+            let look = |block: usize| {
+                // SAFETY: all blocks were here when the epoch had been entered, which goes on.
+                let bytes: &[u8; BLOCK] = unsafe { &*blocks.slots.home(block * BLOCK).cast() };
+                assert!(bytes.iter().all(|&byte| byte == number(block)), "block {block} is not here");
+            };
+            if blocks.is_whole() {
+                for _ in 0..3 {
+                    thread::yield_now();
+                    (0..BLOCKS).for_each(look);
+                }
+            }
+            reader.leave();
+        })
+    };
+    let looker = {
+        let blocks = Arc::clone(&blocks);
+        thread::spawn(move || blocks.look_whether_whole())
+    };
+    blocks.clear();
+    thread::yield_now();
+    blocks.reclaim();
+    [reader.join(), looker.join().map(drop)].into_iter().for_each(|thread| thread.expect("no panic"));
+    leaves_nothing(&blocks);
+    assert!(!blocks.is_whole());
+}
+
+pub fn whole_and_not() {
+    let loading = Loading::Asynchronous { loaders: 2 };
+    let (blocks, loaders) = cache_with(BLOCKS, Replacement::Lru, None, loading, Prefetch::Beside);
+    let loaders = Arc::new(loaders);
+    let threads = start(&blocks, &loaders, &[&[&[0], &[4, 1], &[2]], &[&[2], &[5]]]);
+    let fill = || while blocks.load_rest().expect("all can be read") > 0 {};
+    for _ in 0..2 {
+        blocks.allow_rest(1.0);
+        loaders.rest();
+        fill();
+        blocks.look_whether_whole();
+        thread::yield_now();
+        loaders.forget_ahead();
+        blocks.clear();
+    }
+    threads.into_iter().for_each(|thread| assert_eq!(thread.join().expect("no panic") / 2, 1));
+    fill();
+    assert!(blocks.look_whether_whole(), "nothing else brings or takes any");
+    leaves_nothing(&blocks);
+    assert!(!blocks.is_whole());
 }
 
 pub fn ahead_at_the_end() {

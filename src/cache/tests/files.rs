@@ -47,8 +47,11 @@ fn colors_of_all_kinds_come_from_files_as_they_were() {
         let cached = Cached::open(&file, &CacheOptions::default(), 4 << 20, 0, 2).expect("enough");
         let cached = Arc::new(cached);
         let surface = CachedSurface::new(Arc::clone(&cached), &file).expect("whole");
-        let frame = frame_of(&Accel::of_cached(cached), &surface, &scene.resident).expect("can be read");
-        assert!(frame == expected, "{:?}", file.meta().colors);
+        let accel = Accel::of_cached(Arc::clone(&cached));
+        let frame = || frame_of(&accel, &surface, &scene.resident).expect("can be read");
+        assert!(!cached.is_whole() && frame() == expected, "{:?}", file.meta().colors);
+        cached.fill().expect("can be read");
+        assert!(frame() == expected && cached.is_whole(), "{:?}", file.meta().colors);
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod files;
+mod whole;
 
 use super::policy::Replacement;
 use super::*;

@@ -55,7 +55,7 @@ pub struct Options {
     /// cache of all.
     pub nodes: Option<f32>,
     /// Warm flights, at least one: the last is reported. In the first some blocks still come that kernels looked at
-    /// which were not tried before.
+    /// which were not tried before. Where there is room for all blocks, all are read before.
     pub warm: u32,
     /// Threads at work.
     pub threads: usize,
@@ -131,6 +131,11 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
         let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
         cached.trace_uses(true);
         for pass in 0..=warm {
+            if pass == 1 && cached.holds_all() {
+                // No policy has anything to decide.
+                cached.trace_uses(false);
+                cached.fill()?;
+            }
             let frames = flight.fly(&renderer, Some(&cached))?;
             let uses = cached.take_uses();
             if pass == 0 || pass == warm {
