@@ -262,6 +262,47 @@ mod tests {
     }
 
     #[test]
+    fn one_loader_brings_the_rest_when_nothing_else_is_to_be_done() {
+        let requests = Requests::new(2, 1);
+        let next = || requests.next().expect("it is not closed");
+        requests.rest();
+        requests.ahead(&[2]);
+        requests.need(1);
+        let first = [next(), next()];
+        assert_eq!(first, [Request::Needed(1), Request::Ahead(2)]);
+        first.into_iter().for_each(|request| requests.done(request));
+        assert_eq!(next(), Request::Rest);
+        // The other one has nothing to do with it.
+        requests.need(3);
+        assert_eq!(next(), Request::Needed(3));
+        requests.done(Request::Needed(3));
+        requests.done(Request::Rest);
+        // Beside somebody who reads for himself there is one loader, for what is needed.
+        assert_eq!((next(), requests.try_own()), (Request::Rest, true));
+        requests.done(Request::Rest);
+        thread::scope(|scope| {
+            let loader = scope.spawn(next);
+            thread::sleep(std::time::Duration::from_millis(2));
+            assert!(!loader.is_finished());
+            requests.done_own();
+            assert_eq!(loader.join().expect("no panic"), Request::Rest);
+        });
+        // To forget it is to wait for who brings some of it.
+        thread::scope(|scope| {
+            let forgets = scope.spawn(|| requests.forget_ahead());
+            thread::sleep(std::time::Duration::from_millis(2));
+            assert!(!forgets.is_finished());
+            requests.done(Request::Rest);
+        });
+        requests.rest();
+        assert_eq!(next(), Request::Rest);
+        requests.rest_has_come();
+        requests.done(Request::Rest);
+        requests.close();
+        assert_eq!(requests.next(), None);
+    }
+
+    #[test]
     fn there_are_never_more_reads_than_loaders() {
         let requests = Requests::new(2, 1);
         assert!(requests.try_own() && requests.try_own() && !requests.try_own());

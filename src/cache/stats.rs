@@ -8,7 +8,7 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CacheStats {
     /// Uses of blocks: a tile that needs a block again and again uses it once. Neighbouring lists of
-    /// triangles that are known to be here with all their blocks count as one.
+    /// triangles that are known to be here with all their blocks count as one. None, where all blocks are here and stay.
     pub uses: u64,
     /// Blocks that were waited for.
     pub misses: u64,

@@ -73,9 +73,10 @@ impl Blocks {
         is_whole
     }
 
-    /// From now on, so much of the rest may come as in so many seconds.
+    /// From now on, so much of the rest may come as in so many seconds since the last frame began. If that was long ago, less:
+    /// it all comes in the frame that begins now.
     pub fn allow_rest(&self, seconds: f64) {
-        let blocks = (seconds * REST / self.layout.block_bytes() as f64) as u32;
+        let blocks = (seconds.min(0.25) * REST / self.layout.block_bytes() as f64) as u32;
         self.whole.allowed.store(blocks.max(1), Ordering::Relaxed);
     }
 
