@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn where_something_had_to_go_blocks_come_alone() {
         let (blocks, _loaders, reads) = blocks();
-        blocks.gone.store(1, Ordering::Relaxed);
+        blocks.gone.store(blocks.limit as u32, Ordering::Relaxed);
         ask(&blocks, 5);
         blocks.load_with_others(5);
         assert_eq!((here(&blocks), reads.lock().expect("whole").pop()), (vec![5], Some(5..6)));

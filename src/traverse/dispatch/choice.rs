@@ -218,9 +218,14 @@ impl<const WAYS: usize> Kind<WAYS> {
 
     /// Lots until a way is to be tried again.
     fn wait_of(&self, way: usize) -> f32 {
-        let slower = (2.0 * (self.cost[way] - self.cost[self.quickest()])).exp2() - 1.0;
+        let quickest = self.quickest();
+        if way == quickest {
+            // As what follows would give it. Nearly every lot is one of these, and is spared the power of two.
+            return LEAST_WAIT;
+        }
+        let slower = (2.0 * (self.cost[way] - self.cost[quickest])).exp2() - 1.0;
         let known = (self.taken[way] as f32 / KNOWN_WELL).min(1.0);
-        (LEAST_WAIT + WAIT * slower.max(0.0) * known).min(MOST_WAIT)
+        (LEAST_WAIT + WAIT * slower * known).min(MOST_WAIT)
     }
 }
 
