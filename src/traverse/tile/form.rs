@@ -119,7 +119,9 @@ pub fn from_apex<L: Sixteen>(
     rays: &[RayPacket<16>],
     active: &mut [u32; PACKETS],
 ) -> Option<Extent<L>> {
-    let mut extents = Extents::new();
+    let (zero, endless) = (L::splat(0.0), L::splat(f32::INFINITY));
+    let mut places = [[[0.0; 16]; 2]; PACKETS];
+    let (mut nearest, mut farthest) = ([0.0; PACKETS], [f32::INFINITY; PACKETS]);
     let mut misfits = 0;
     for (packet, rays) in rays.iter().enumerate() {
         let lanes = active[packet];
@@ -142,9 +144,20 @@ pub fn from_apex<L: Sixteen>(
             leave_out(&mut active[packet], &mut misfits)?;
             continue;
         }
-        extents.set(packet, lanes, slopes, tnear * forward, tfar * forward);
+        places[packet] = [slopes[0].store(), slopes[1].store()];
+        // Rays from a camera mostly have no ends of their own.
+        let endless = tnear.eq(zero) & tfar.eq(endless);
+        if endless.bits() & lanes != lanes {
+            (nearest[packet], farthest[packet]) = ends(lanes, tnear * forward, tfar * forward);
+        }
     }
-    Some(extents.finish(0.0))
+    for packet in 0..PACKETS {
+        if active[packet] == 0 {
+            (nearest[packet], farthest[packet]) = (f32::INFINITY, f32::NEG_INFINITY);
+        }
+    }
+    let (low, high) = rectangles::<L>(&places, active);
+    Some(extent(low, high, L::load(&nearest), L::load(&farthest), 0.0))
 }
 
 /// The packets' extents, what each ray looks like, and how far rays are off, if they are a beam of some
@@ -161,7 +174,6 @@ pub fn of_form<L: Sixteen>(
     let sign = L::splat(frame.sign);
     let along = [L::splat(frame.slopes[0]), L::splat(frame.slopes[1])];
     let place = frame.apex.iter().fold(0.0f32, |place, x| place.max(x.abs()));
-    let mut extents = Extents::new();
     let mut range = zero;
     let mut first_direction = None;
     let mut misfits = 0;
@@ -213,7 +225,6 @@ pub fn of_form<L: Sixteen>(
         let counts = L::mask_from_bits(lanes);
         range = range.max(L::select(counts, o[0].abs().max(o[1].abs()).max(o[2].abs()), zero));
         let places = if form == Form::Along { crossing } else { slopes };
-        extents.set(packet, lanes, places, near, far);
         seen.place[packet] = [places[0].store(), places[1].store()];
         seen.start[packet] = o[2].store();
         seen.speed[packet] = d[2].store();
@@ -222,7 +233,10 @@ pub fn of_form<L: Sixteen>(
     }
     let range = range.greatest();
     let stray = if form == Form::Toward { range * STRAY + place * STRAY_OF_PLACE } else { 0.0 };
-    Some((extents.finish(range), Spread { range, stray }))
+    let (low, high) = rectangles::<L>(&seen.place, active);
+    let nearest = L::least_of_rows(rows(&seen.near, active, f32::INFINITY));
+    let farthest = L::greatest_of_rows(rows(&seen.far, active, f32::NEG_INFINITY));
+    Some((extent(low, high, nearest, farthest, range), Spread { range, stray }))
 }
 
 /// Takes a packet out that does not belong. `None` if there are too many.
@@ -244,47 +258,51 @@ fn ordinary<L: Sixteen>(forward: L, tnear: L, tfar: L) -> L::Mask {
         & tfar.le(L::splat(f32::INFINITY))
 }
 
-/// Packets' extents in the making.
-struct Extents {
-    low: [[f32; 16]; 2],
-    high: [[f32; 16]; 2],
-    nearest: [f32; 16],
-    farthest: [f32; 16],
+/// Where the first of some lanes looks for hits, and where the last does.
+#[inline(always)]
+fn ends<L: Sixteen>(lanes: u32, near: L, far: L) -> (f32, f32) {
+    let counts = L::mask_from_bits(lanes);
+    let nearest = L::select(counts, near, L::splat(f32::INFINITY)).least();
+    (nearest, L::select(counts, far, L::splat(f32::NEG_INFINITY)).greatest())
 }
 
-impl Extents {
-    /// Extents of no ray.
-    #[inline(always)]
-    const fn new() -> Self {
-        const NONE: [f32; 16] = [f32::INFINITY; 16];
-        const NEVER: [f32; 16] = [f32::NEG_INFINITY; 16];
-        Self { low: [NONE; 2], high: [NEVER; 2], nearest: NONE, farthest: NEVER }
+/// A number of each packet's rays, `other` for those that do not count.
+#[inline(always)]
+fn rows<L: Sixteen>(numbers: &[[f32; 16]; PACKETS], active: &[u32; PACKETS], other: f32) -> [L; PACKETS] {
+    let mut rows = [L::splat(other); PACKETS];
+    for packet in 0..PACKETS {
+        rows[packet] =
+            L::select(L::mask_from_bits(active[packet]), L::load(&numbers[packet]), L::splat(other));
     }
+    rows
+}
 
-    #[inline(always)]
-    fn set<L: Sixteen>(&mut self, packet: usize, lanes: u32, places: [L; 2], near: L, far: L) {
-        let (counts, most) = (L::mask_from_bits(lanes), L::splat(f32::INFINITY));
-        let least = L::splat(f32::NEG_INFINITY);
-        for side in 0..2 {
-            self.low[side][packet] = L::select(counts, places[side], most).least();
-            self.high[side][packet] = L::select(counts, places[side], least).greatest();
+/// The least and the greatest places of each packet.
+#[inline(always)]
+fn rectangles<L: Sixteen>(
+    places: &[[[f32; 16]; 2]; PACKETS],
+    active: &[u32; PACKETS],
+) -> ([L; 2], [L; 2]) {
+    let (mut low, mut high) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
+    for side in 0..2 {
+        let (mut least, mut greatest) = ([L::splat(0.0); PACKETS], [L::splat(0.0); PACKETS]);
+        for packet in 0..PACKETS {
+            let (counts, row) = (L::mask_from_bits(active[packet]), L::load(&places[packet][side]));
+            least[packet] = L::select(counts, row, L::splat(f32::INFINITY));
+            greatest[packet] = L::select(counts, row, L::splat(f32::NEG_INFINITY));
         }
-        self.nearest[packet] = L::select(counts, near, most).least();
-        self.farthest[packet] = L::select(counts, far, least).greatest();
+        low[side] = L::least_of_rows(least);
+        high[side] = L::greatest_of_rows(greatest);
     }
+    (low, high)
+}
 
-    /// The extents of rays whose origins are up to `range` away from the apex.
-    #[inline(always)]
-    fn finish<L: Sixteen>(&self, range: f32) -> Extent<L> {
-        let (nearest, farthest) = (L::load(&self.nearest), L::load(&self.farthest));
-        // Outward by more than the roundings of depths, which are sums, and may have either sign.
-        let more = L::splat(range * (WIDEN - 1.0));
-        let tmin = (nearest * L::splat(NARROW)).min(nearest * L::splat(WIDEN)) - more;
-        let tmax = (farthest * L::splat(WIDEN)).max(farthest * L::splat(NARROW)) + more;
-        Extent {
-            low: [L::load(&self.low[0]), L::load(&self.low[1])],
-            high: [L::load(&self.high[0]), L::load(&self.high[1])],
-            depths: Interval { tmin, tmax },
-        }
-    }
+/// The extents of packets whose rays' origins are up to `range` away from the apex.
+#[inline(always)]
+fn extent<L: Sixteen>(low: [L; 2], high: [L; 2], nearest: L, farthest: L, range: f32) -> Extent<L> {
+    // Outward by more than the roundings of depths, which are sums, and may have either sign.
+    let more = L::splat(range * (WIDEN - 1.0));
+    let tmin = (nearest * L::splat(NARROW)).min(nearest * L::splat(WIDEN)) - more;
+    let tmax = (farthest * L::splat(WIDEN)).max(farthest * L::splat(NARROW)) + more;
+    Extent { low, high, depths: Interval { tmin, tmax } }
 }

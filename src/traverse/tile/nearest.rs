@@ -33,8 +33,9 @@ where
     beam: &'a Beam<L, false>,
     kept: [[Kept<M, R, N>; P]; PACKETS],
     closest: [[Closest<N, R>; P]; PACKETS],
-    /// The depth beyond which no ray of a packet looks for anything any more.
-    reach: [f32; PACKETS],
+    /// The depth beyond which no ray of a packet looks for anything any more. In a register: a lane that is stored
+    /// by itself and loaded with the others at once waits for the memory.
+    reach: L,
 }
 
 impl<'a, L, R, T, M, const N: usize, const P: usize> Nearest<'a, L, R, T, M, N, P>
@@ -59,7 +60,7 @@ where
             beam,
             kept: [[Default::default(); P]; PACKETS],
             closest: [[Closest::new(R::splat(f32::NEG_INFINITY)); P]; PACKETS],
-            reach: [f32::INFINITY; PACKETS],
+            reach: L::splat(f32::INFINITY),
         };
         for packet in 0..rays.len().min(PACKETS) {
             for part in 0..P {
@@ -112,7 +113,8 @@ where
             let depth = (self.closest[packet][part].t * speed).greatest();
             reach = if depth > reach { depth } else { reach };
         }
-        self.reach[packet] = reach + reach.abs() * ROUNDINGS;
+        let reach = L::splat(reach + reach.abs() * ROUNDINGS);
+        self.reach = L::select(L::mask_from_bits(1 << packet), reach, self.reach);
     }
 }
 
@@ -131,7 +133,7 @@ where
 
     #[inline(always)]
     fn reach(&self) -> L {
-        L::load(&self.reach)
+        self.reach
     }
 
     #[inline(always)]
