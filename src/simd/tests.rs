@@ -127,6 +127,17 @@ fn check_sixteen<L: Sixteen>() {
             assert_eq!(column[j], fours[(j * 5) & 15][i], "number {i} of record {j}");
         }
     }
+    // Row `i` has its least lane at `i + turn`, the greatest one eight lanes farther.
+    for turn in 0..16 {
+        let mut rows = [L::splat(0.0); 16];
+        for i in 0..16 {
+            let mut row: [f32; 16] = std::array::from_fn(|lane| (lane * 7 % 5) as f32);
+            (row[(i + turn) & 15], row[(i + turn + 8) & 15]) = (-10.0 - i as f32, 10.0 + i as f32);
+            rows[i] = L::load(&row);
+        }
+        assert_eq!(L::least_of_rows(rows).store(), std::array::from_fn(|i| -10.0 - i as f32));
+        assert_eq!(L::greatest_of_rows(rows).store(), std::array::from_fn(|i| 10.0 + i as f32));
+    }
 }
 
 struct CheckAll;

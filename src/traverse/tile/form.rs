@@ -279,10 +279,7 @@ fn rows<L: Sixteen>(numbers: &[[f32; 16]; PACKETS], active: &[u32; PACKETS], oth
 
 /// The least and the greatest places of each packet.
 #[inline(always)]
-fn rectangles<L: Sixteen>(
-    places: &[[[f32; 16]; 2]; PACKETS],
-    active: &[u32; PACKETS],
-) -> ([L; 2], [L; 2]) {
+fn rectangles<L: Sixteen>(places: &[[[f32; 16]; 2]; PACKETS], active: &[u32; PACKETS]) -> ([L; 2], [L; 2]) {
     let (mut low, mut high) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
     for side in 0..2 {
         let (mut least, mut greatest) = ([L::splat(0.0); PACKETS], [L::splat(0.0); PACKETS]);
