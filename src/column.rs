@@ -4,8 +4,8 @@
 //! are once all of them have come. Who reads them sees a slice either way, and pays for a pointer and a length: which it is
 //! decides only who frees the memory.
 
+use crate::mapped::Map;
 use bytemuck::AnyBitPattern;
-use memmap2::Mmap;
 use std::fmt;
 use std::marker::PhantomData;
 use std::mem::ManuallyDrop;
@@ -41,7 +41,7 @@ impl<T: AnyBitPattern> Column<T> {
     /// values, or begins where no value may.
     ///
     /// The values change if the file does: whoever mapped it has vouched that it does not.
-    pub fn mapped(map: Arc<Mmap>, bytes: Range<usize>) -> Option<Self> {
+    pub fn mapped(map: Arc<Map>, bytes: Range<usize>) -> Option<Self> {
         let values: &[T] = bytemuck::try_cast_slice(map.get(bytes)?).ok()?;
         let (start, len) = (NonNull::from(values).cast(), values.len());
         Some(Self { start, len, owner: Owner::Shared(map), values: PhantomData })
@@ -114,11 +114,10 @@ mod tests {
     use super::*;
     use std::io::Write;
 
-    fn map_of(bytes: &[u8]) -> Arc<Mmap> {
-        let mut file = tempfile::tempfile().expect("a file");
+    fn map_of(bytes: &[u8]) -> Arc<Map> {
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
         file.write_all(bytes).expect("written");
-        // SAFETY: the file has no name and is this test's own: nobody changes it.
-        Arc::new(unsafe { Mmap::map(&file) }.expect("mapped"))
+        Arc::new(Map::open(file.path()).expect("mapped").1)
     }
 
     #[test]

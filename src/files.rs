@@ -1,6 +1,7 @@
 //! Files that are whole or not there at all.
 
 use crate::error::{Error, Result};
+use crate::stage::Stage;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::mem;
@@ -12,8 +13,8 @@ use tempfile::NamedTempFile;
 static DRAFTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file through `fill`: into a temporary file beside the target, which takes the
-/// target's name when it is complete and on the disk. What `path` held before stays until then; on
-/// failure nothing is left behind.
+/// target's name when it is complete and on the disk; then the name goes there, too. What `path` held before stays until
+/// it is renamed; on failure before that nothing is left behind.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -28,6 +29,7 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::R
 /// [`Error::Write`], or what `fill` fails with.
 pub fn write_or<T>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Result<T>) -> Result<T> {
     let cannot = |source| Error::Write { path: path.into(), source };
+    let folder = Folder::open(folder_of(path)).map_err(cannot)?;
     let (temporary, _listed) = beside(path).map_err(cannot)?;
     // The file itself: tempfile would put its own path into every error.
     let file = temporary.as_file().try_clone().map_err(cannot)?;
@@ -36,8 +38,12 @@ pub fn write_or<T>(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Resul
     // Some file systems find no room only now; and a name must not outlive a power cut that its
     // bytes did not.
     let file = out.into_inner().map_err(|error| cannot(error.into_error()))?;
+    Stage::Syncing.begin();
     file.sync_data().map_err(cannot)?;
+    Stage::Renaming.begin();
     temporary.persist(path).map_err(|error| cannot(error.error))?;
+    Stage::Named.begin();
+    folder.sync().map_err(cannot)?;
     Ok(result)
 }
 
@@ -55,6 +61,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
             _ => {}
         }
         let (temporary, _listed) = beside(path)?;
+        Folder::open(folder_of(path))?;
         temporary.close()
     };
     check().map_err(|source| Error::Write { path: path.into(), source })
@@ -98,6 +105,49 @@ pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
+/// A folder in which names change.
+struct Folder {
+    #[cfg(unix)]
+    open: File,
+}
+
+impl Folder {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// It is not there, or may not be read.
+    fn open(path: &Path) -> io::Result<Self> {
+        #[cfg(unix)]
+        let folder = File::open(path).map(|open| Self { open }).map_err(|error| no_folder(path, &error));
+        #[cfg(not(unix))]
+        let folder = fs::metadata(path).map(|_| Self {}).map_err(|error| no_folder(path, &error));
+        folder
+    }
+
+    /// Has its names on the disk, so that a file that was renamed has its new name after a power cut. On Unix; other
+    /// systems see to that themselves, or cannot.
+    fn sync(&self) -> io::Result<()> {
+        #[cfg(unix)]
+        match self.open.sync_all() {
+            // Some file systems, of other machines for instance, know no such thing for folders.
+            Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {}
+            synced => return synced,
+        }
+        Ok(())
+    }
+}
+
+/// An error about a folder that a file is to be in. Paths in messages are those that were asked for.
+fn no_folder(folder: &Path, error: &io::Error) -> io::Error {
+    match error.kind() {
+        ErrorKind::NotFound => io::Error::new(
+            ErrorKind::NotFound,
+            format!("there is no folder {}; make it first", folder.display()),
+        ),
+        kind => kind.into(),
+    }
+}
+
 /// A temporary file in the folder of `path`, which vanishes when dropped, or with all that are [abandoned](abandon).
 fn beside(path: &Path) -> io::Result<(NamedTempFile, Listed)> {
     let folder = folder_of(path);
@@ -110,13 +160,7 @@ fn beside(path: &Path) -> io::Result<(NamedTempFile, Listed)> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     // tempfile puts its own path into the message; which file was asked for is in ours.
-    Listed::make(|| builder.tempfile_in(folder)).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => io::Error::new(
-            ErrorKind::NotFound,
-            format!("there is no folder {}; make it first", folder.display()),
-        ),
-        kind => kind.into(),
-    })
+    Listed::make(|| builder.tempfile_in(folder)).map_err(|error| no_folder(folder, &error))
 }
 
 /// Fills `into` with a file's bytes from an offset on. The file's own position means nothing, and on Windows
@@ -210,5 +254,19 @@ mod tests {
         check_writable(folder.path()).expect_err("it is a folder");
         let error = check_writable(&folder.path().join("no/a.png")).expect_err("there is no such folder");
         assert!(error.to_string().contains("there is no folder"), "{error}");
+    }
+
+    #[test]
+    fn folders_are_synced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        Folder::open(folder.path()).and_then(|folder| folder.sync()).expect("synced");
+        let error = Folder::open(&folder.path().join("no")).map(drop).expect_err("there is no such folder");
+        assert!(error.to_string().contains("there is no folder"), "{error}");
+        // A folder that cannot be synced because it is none: its error is handed on.
+        #[cfg(target_os = "linux")]
+        {
+            let error = Folder::open(Path::new("/dev/null/no")).map(drop).expect_err("it is no folder");
+            assert_eq!(error.kind(), ErrorKind::NotADirectory);
+        }
     }
 }

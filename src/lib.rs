@@ -37,6 +37,7 @@
 //!
 //! | room | what is in it |
 //! |---|---|
+//! | [`mapped`] | files that are mapped, and which of them an address lies in |
 //! | [`mod@column`] | arrays that are owned, or lie in a mapped file |
 //! | [`mod@spool`] | lists that wait in files |
 //! | [`simd`] | vectors of 4, 8 and 16 floats, and the choice of an instruction set at run time |
@@ -69,12 +70,14 @@ pub mod files;
 pub mod geometry;
 mod huge;
 pub mod kdtree;
+pub mod mapped;
 pub mod mesh;
 pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod simd;
 pub mod spool;
+mod stage;
 pub mod store;
 pub mod study;
 pub mod traverse;

@@ -1,6 +1,7 @@
 //! What a cache did.
 
 use super::sync::{AtomicU64, Ordering};
+use crossbeam::utils::CachePadded;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -38,16 +39,17 @@ impl CacheStats {
     }
 }
 
-/// The same, while it is counted.
+/// The same, while it is counted. Each in a line of the processor's caches: threads that wait count some of them, and
+/// loaders others.
 #[derive(Debug, Default)]
 pub struct Counters {
-    pub misses: AtomicU64,
-    pub loads: AtomicU64,
-    pub bytes_read: AtomicU64,
-    pub evictions: AtomicU64,
-    pub prefetched: AtomicU64,
-    pub stalled_ns: AtomicU64,
-    pub loading_ns: AtomicU64,
+    pub misses: CachePadded<AtomicU64>,
+    pub loads: CachePadded<AtomicU64>,
+    pub bytes_read: CachePadded<AtomicU64>,
+    pub evictions: CachePadded<AtomicU64>,
+    pub prefetched: CachePadded<AtomicU64>,
+    pub stalled_ns: CachePadded<AtomicU64>,
+    pub loading_ns: CachePadded<AtomicU64>,
 }
 
 /// Adds to a counter.

@@ -11,6 +11,7 @@ use crate::files::{check_writable, folder_of};
 use crate::kdtree::TreeStats;
 use crate::mesh::generate::Size;
 use crate::mesh::generate::plant::{self, PlantParams, TRIANGLES};
+use crate::stage::Stage;
 use crate::store::is_scene;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -125,6 +126,7 @@ fn scene(args: &PlantArgs, params: PlantParams) -> Result<Report<'_>> {
     let build = args.build.profile()?.build;
     let limit = args.build.limit()?.unwrap_or(MEMORY);
     let start = Instant::now();
+    Stage::Generating.begin();
     let bar = Bar::new("generating");
     let mesh = plant::spool(folder_of(&args.output), params, &|fraction| bar.set(fraction))?;
     drop(bar);

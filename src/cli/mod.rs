@@ -10,6 +10,7 @@ mod cache;
 mod cache_options;
 mod cast;
 mod effects;
+mod fault;
 mod generate;
 mod histogram;
 mod info;
@@ -25,6 +26,7 @@ mod scaling;
 mod scene;
 mod tune;
 
+use crate::stage;
 use clap::{ArgAction, Parser, Subcommand};
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -61,7 +63,8 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     log(cli.verbose);
     interrupt::handle();
-    let result = match &cli.command {
+    fault::handle();
+    let result = stage::from_env().and_then(|()| match &cli.command {
         Command::Render(args) => render::run(args),
         Command::Build(args) => build::run(args),
         Command::Effects(args) => effects::run(args),
@@ -73,7 +76,7 @@ pub fn main() -> ExitCode {
         Command::Cast(args) => cast::run(args),
         Command::Generate(args) => generate::run(args),
         Command::Tune(args) => tune::run(args),
-    };
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -9,6 +9,7 @@ use crate::kdtree::{BuildParams, BuildProgress};
 use crate::mesh::generate::plant;
 use crate::mesh::{self, Mesh, ReadReport};
 use crate::simd::Isa;
+use crate::stage::Stage;
 use crate::store::{self, is_scene};
 use crate::study::resident::Resident;
 use crate::traverse::Accel;
@@ -36,6 +37,7 @@ impl Model {
         let (mesh, report) = if is_scene(path) {
             (store::File::open(path)?.mesh()?, None)
         } else {
+            Stage::Reading.begin();
             let bar = Bar::new("reading");
             let loaded = mesh::read_with_progress(path, &|fraction| bar.set(f64::from(fraction)));
             let loaded = loaded.map_err(or_scene)?;
@@ -66,6 +68,7 @@ impl Model {
         let resident = Resident::start();
         let start = Instant::now();
         let progress = BuildProgress::default();
+        Stage::Building.begin();
         let accel = watch(
             "building",
             || progress.fraction(),

@@ -3,10 +3,10 @@
 use super::check::{self, MAX_TRIANGLES, Unusable};
 use super::{Mesh, gltf, obj, ply, stl};
 use crate::error::{Error, Result};
-use memmap2::Mmap;
+use crate::mapped::Map;
+use crate::stage::Stage;
 use serde::Serialize;
 use std::fmt::Write as _;
-use std::fs::File;
 use std::path::Path;
 
 /// A model as it came out of its file.
@@ -211,6 +211,7 @@ fn parse_with(parser: Parser, bytes: &[u8], path: &Path, progress: &dyn Fn(f32))
     let mut report = ReadReport::default();
     let raw = parser(bytes, path, &mut report, progress).map_err(malformed)?;
     let (vertices, faces) = (raw.positions.len(), raw.triangles.len());
+    Stage::Checking.begin();
     let mesh =
         check::check(raw, &mut report).map_err(|unusable| malformed(unusable.message(vertices, faces)))?;
     progress(1.0);
@@ -241,17 +242,9 @@ impl Unusable {
     }
 }
 
-/// The file's bytes, mapped.
-pub(super) fn map(path: &Path) -> std::io::Result<Mmap> {
-    let file = File::open(path)?;
-    if file.metadata()?.is_dir() {
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    // SAFETY: the map is read-only and dropped before `read` returns; nothing of it is kept. The one
-    // thing that a map cannot promise is that no other process writes to the file meanwhile. Every
-    // value is checked after it was taken, so changed bytes give an error or another model; a file
-    // that is cut short meanwhile ends the process (SIGBUS), as in every program that maps files.
-    unsafe { Mmap::map(&file) }
+/// The file's bytes, mapped. Nothing of them is kept: whoever maps a model drops the map when it is read.
+pub(super) fn map(path: &Path) -> std::io::Result<Map> {
+    Map::open(path).map(|(_, map)| map)
 }
 
 #[cfg(test)]

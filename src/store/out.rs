@@ -4,6 +4,7 @@ use super::checksum::{BLOCK, of_block, of_blocks};
 use super::header::Header;
 use super::section::{ALIGNMENT, Kind, Section};
 use super::writer::Written;
+use crate::stage::Stage;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Bytes between two reports of progress.
@@ -132,6 +133,7 @@ impl<'a, W: Write + Seek> Out<'a, W> {
     /// # Errors
     /// As [`section`](Self::section).
     pub fn finish(mut self) -> io::Result<Written> {
+        Stage::Closing.begin();
         let table = self.at;
         debug_assert_eq!(self.checksums.len() as u64 * BLOCK as u64, table);
         self.file.write_all(bytemuck::cast_slice(&self.checksums))?;

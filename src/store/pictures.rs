@@ -8,6 +8,7 @@ use super::section::Kind;
 use crate::error::Result;
 use crate::files::read_at;
 use crate::mesh::{Image, ImageSource, MAX_IMAGE_BYTES, Packed};
+use crate::stage::Stage;
 use std::fs;
 use std::io::{self, Seek, Write};
 use std::ops::Range;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 /// # Errors
 /// The file cannot be written.
 pub(super) fn write<W: Write + Seek>(out: &mut Out<'_, W>, images: &[Image]) -> io::Result<Vec<ImageMeta>> {
+    Stage::Pictures.begin();
     let mut entries = Vec::with_capacity(images.len());
     let mut end = 0;
     for Image { name, source } in images {

@@ -6,9 +6,8 @@ use super::meta::{ColorMeta, Meta};
 use super::section::{Kind, Section, sections};
 use crate::column::Column;
 use crate::error::{Error, Result};
+use crate::mapped::Map;
 use bytemuck::AnyBitPattern;
-use memmap2::Mmap;
-use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::slice;
@@ -21,7 +20,7 @@ pub struct File {
     path: PathBuf,
     /// What is mapped, for who reads it piece by piece.
     handle: Arc<std::fs::File>,
-    map: Arc<Mmap>,
+    map: Arc<Map>,
     sections: Vec<Section>,
     checksums: Column<u32>,
     meta: Meta,
@@ -34,17 +33,20 @@ impl File {
     /// order, whole; its tables, and its meta section. Its arrays are checked by who hands them out.
     ///
     /// The file must not be changed while it is open; to replace it, as [`write`](super::write()) does, is no
-    /// change.
+    /// change. Where it has been cut short, or its disk fails, reading what is mapped of it ends the process by a signal
+    /// (SIGBUS): a program that would rather say something installs a handler and asks
+    /// [`mapped`](crate::mapped) which file it was, as the command line does. The library installs none. What a
+    /// [`Cached`](crate::cache::Cached) scene reads when it is needed is read explicitly, and errors are errors.
     ///
     /// # Errors
     /// The file cannot be read, or it says what it is instead.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let (handle, map) = map(path).map_err(|source| Error::Read { path: path.into(), source })?;
+        let (handle, map) = Map::open(path).map_err(|source| Error::Read { path: path.into(), source })?;
         Self::of_map(path, handle, Arc::new(map)).map_err(|message| Error::malformed(path, message))
     }
 
-    fn of_map(path: &Path, handle: std::fs::File, map: Arc<Mmap>) -> Result<Self, String> {
+    fn of_map(path: &Path, handle: std::fs::File, map: Arc<Map>) -> Result<Self, String> {
         let (header, table) = Header::read(&map)?;
         let (end, length) = (header.checksums_offset, header.length as usize);
         let checksums = Column::<u32>::mapped(Arc::clone(&map), end as usize..length)
@@ -193,18 +195,4 @@ fn damaged(sections: &[Section], block: usize) -> String {
     };
     let (first, last) = (block * BLOCK, (block + 1) * BLOCK - 1);
     format!("{place}: the checksum of bytes {first} to {last} is another; build it again")
-}
-
-/// The file, open, and its bytes, mapped.
-fn map(path: &Path) -> io::Result<(std::fs::File, Mmap)> {
-    let file = std::fs::File::open(path)?;
-    if file.metadata()?.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
-    }
-    // SAFETY: the map is read-only. That no other process writes to the file meanwhile is what no map can
-    // promise; raypack itself never does, it replaces files whole. Every type that is read from it has a value
-    // for any bits, and indices are checked where they are used, so that bytes changed behind our back give
-    // wrong pictures or a panic; a file that is cut short ends the process (SIGBUS).
-    let map = unsafe { Mmap::map(&file) }?;
-    Ok((file, map))
 }

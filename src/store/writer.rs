@@ -10,6 +10,7 @@ use crate::files::write_whole;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::{KdTree, Tree};
 use crate::mesh::{Colors, Image, ImageSource, Mesh};
+use crate::stage::Stage;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -81,6 +82,7 @@ pub fn write(
     let mut meta = Meta::new(mesh, tree, source);
     let mut written = None;
     write_whole(path, |file| {
+        Stage::Writing.begin();
         let mut out = Out::new(file, &part)?;
         for (kind, bytes) in &sections {
             out.section(*kind, bytes)?;

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::files::folder_of;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::spooled::{self, SpooledMesh};
+use crate::stage::Stage;
 use crate::store::large::{self, Built, Progress};
 use crate::store::{self, Written, is_scene};
 use crate::study::resident;
@@ -55,6 +56,7 @@ pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
     let (mesh, mut read_report) = if is_scene(path) {
         (store::File::open(path)?.spooled_mesh(folder)?, None)
     } else {
+        Stage::Reading.begin();
         let bar = Bar::new("reading");
         let (mesh, report) = spooled::read(path, folder, &|part| bar.set(f64::from(part)))?;
         (mesh, Some(report))

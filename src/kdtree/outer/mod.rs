@@ -39,6 +39,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::simd::Chosen;
+use crate::stage::Stage;
 pub use crown::Plan;
 use crown::Top;
 use list::List;
@@ -313,6 +314,7 @@ impl Builder<'_> {
             None => None,
         };
         let Some(split) = split else { return self.leaf(list, place, places) };
+        Stage::Splitting.begin();
         let [below, above] = list.divide(self.job, &context, &split)?;
         let counts = [below.count(), above.count()];
         let Some([place_below, place_above]) = place.children(&split, &Verdict::Good, counts, count) else {
@@ -332,6 +334,7 @@ impl Builder<'_> {
 
     /// Writes what is left to be written.
     fn finish(mut self, top: Top) -> Result<Outline> {
+        Stage::Joining.begin();
         self.append(Array::References, &[0_u32; AFTER])?;
         for Patch { places, node, upper } in std::mem::take(&mut self.patches) {
             let at = |place: usize| place * size_of::<Node>();

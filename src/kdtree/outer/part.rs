@@ -12,6 +12,7 @@ use crate::kdtree::node::Node;
 use crate::kdtree::pages::{Pages, sort_and_dedup};
 use crate::kdtree::spread;
 use crate::simd::Chosen;
+use crate::stage::Stage;
 use rayon::prelude::*;
 
 /// Levels of the tree in a line.
@@ -27,6 +28,7 @@ impl Builder<'_> {
         places: Places,
         is_sure: bool,
     ) -> Result<Option<Top>> {
+        Stage::Building.begin();
         let mark = self.job.progress.map(BuildProgress::mark);
         self.ledger.begin((!is_sure).then_some(self.sizes.memory));
         let Some(built) = self.built(list, place)? else {

@@ -2,6 +2,7 @@
 
 use super::uri::{self, Target};
 use super::view::View;
+use crate::mapped::Map;
 use crate::mesh::read;
 use crate::mesh::spooled::{in_small_pages, let_go};
 use gltf::Document;
@@ -27,7 +28,7 @@ enum Bytes<'a> {
     /// In the model's file.
     Carried(&'a [u8]),
     /// In a file of their own.
-    Mapped(Mmap),
+    Mapped(Map),
     /// In a URI, decoded.
     Decoded(Vec<u8>),
 }

@@ -14,6 +14,7 @@ use super::{Attributes, Colors, Image, Material, Mesh, ReadReport, gltf, obj, pl
 use crate::error::{Error, Result};
 use crate::geometry::Aabb;
 use crate::spool::{Spool, Spooled};
+use crate::stage::Stage;
 use behind::Behind;
 pub(super) use behind::{in_small_pages, let_go};
 use bytemuck::Pod;
@@ -221,6 +222,7 @@ impl Whole {
         progress: &dyn Fn(f32),
     ) -> Result<SpooledMesh> {
         let (vertices, faces) = (self.positions.len(), self.triangles.len());
+        Stage::Checking.begin();
         check(self, lists.folder(), report, progress).map_err(|fault| match fault {
             Fault::Io(source) => Error::Write { path: lists.folder().into(), source },
             Fault::Unusable(unusable) => Error::malformed(path, unusable.message(vertices, faces)),

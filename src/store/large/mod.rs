@@ -26,6 +26,7 @@ use crate::kdtree::outer::{self, Array, Job, Outline, Triangles};
 use crate::kdtree::{BuildParams, BuildProgress, Scale, TreeStats};
 use crate::mesh::spooled::{SpooledColors, SpooledMesh};
 use crate::spool::Spooled;
+use crate::stage::Stage;
 use arrays::Arrays;
 use shelf::FileShelf;
 use std::fs::File;
@@ -102,6 +103,7 @@ pub fn build(
     write_or(path, |file| {
         let mut out = Out::new(file, &|_| ()).map_err(cannot)?;
         let scale = Scale::of_bounds(&mesh.bounds);
+        Stage::Surfaces.begin();
         let surfaces =
             surfaces::write(&mut out, mesh, scale, &|part| progress.set(0.5 * part)).map_err(cannot)?;
 
@@ -126,6 +128,7 @@ pub fn build(
         let outline = outer::build(&job, &mut arrays)?;
         drop(shelf);
 
+        Stage::Writing.begin();
         out.resume().map_err(cannot)?;
         write_tree(&mut out, arrays, &outline, progress).map_err(cannot)?;
         let Outline { stats, largest_page, spread, peak, parts, .. } = outline;
