@@ -6,6 +6,7 @@ use super::plan::{CacheOptions, Loading, Plan, Prefetch};
 use super::policy::Replacement;
 use super::source::Source;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -140,6 +141,58 @@ fn blocks_are_what_they_should_be_for_as_long_as_they_are_read() {
             };
             stress(6, &options, 3000, false);
             stress(6, &options, 3000, true);
+        }
+    }
+}
+
+#[test]
+fn every_policy_holds_sets_of_one() {
+    for policy in Replacement::ALL {
+        for (stripes, loading) in [
+            (1, Loading::Synchronous),
+            (1024, Loading::Asynchronous { loaders: 2 }),
+            (3, Loading::Synchronous),
+        ] {
+            let nodes = (stripes == 3).then_some((0.4, policy));
+            let prefetch = if stripes == 1 { Prefetch::Ahead } else { Prefetch::Beside };
+            let options = CacheOptions {
+                block: BLOCK,
+                ways: 1,
+                stripes,
+                policy,
+                nodes,
+                loading,
+                direct: false,
+                prefetch,
+            };
+            stress(4, &options, 1500, false);
+        }
+    }
+}
+
+#[test]
+fn many_threads_get_through_a_tiny_cache() {
+    /// Only what hangs takes so long.
+    const LONG: Duration = Duration::from_secs(120);
+    for (ways, loading) in [
+        (1, Loading::Synchronous),
+        (1, Loading::Asynchronous { loaders: 1 }),
+        (8, Loading::Asynchronous { loaders: 16 }),
+    ] {
+        let (tell, told) = mpsc::channel();
+        // Not in a scope: what hangs is left behind.
+        thread::spawn(move || {
+            let prefetch = Prefetch::Beside;
+            let options =
+                CacheOptions { block: BLOCK, ways, stripes: 2, loading, prefetch, ..CacheOptions::default() };
+            stress(32, &options, 400, false);
+            stress(32, &options, 400, true);
+            let _ = tell.send(());
+        });
+        match told.recv_timeout(LONG) {
+            Ok(()) => {}
+            Err(RecvTimeoutError::Timeout) => panic!("32 threads hang: {ways} ways, {loading:?}"),
+            Err(RecvTimeoutError::Disconnected) => panic!("it failed: {ways} ways, {loading:?}"),
         }
     }
 }

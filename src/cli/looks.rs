@@ -55,6 +55,17 @@ impl LooksOptions {
         }
     }
 
+    /// Bytes of memory that the environment takes at most while it is opened and from then on, if there is one. It is
+    /// opened to know.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn environment_bytes(&self) -> Result<Option<usize>> {
+        let environment = self.environment.as_deref().map(Environment::open).transpose()?;
+        // While it is opened, the picture of its file is there as well.
+        Ok(environment.map(|environment| 2 * environment.bytes()))
+    }
+
     fn limits(&self) -> Limits {
         let Self { bounces, shadow_samples, roulette, .. } = *self;
         Limits { bounces, shadow_samples, roulette, error: self.error.unwrap_or(0.0) }

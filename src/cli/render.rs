@@ -161,11 +161,19 @@ impl Args {
         let request = self.looks.check()?;
         // The picture that a frame was at first stays until the frame is complete.
         let frames = 1 + usize::from(self.first_within.is_some());
+        let environment = self.looks.environment_bytes()?;
         let beside = |file: &store::File, workers| {
             let meta = file.meta();
             let materials = meta.colors.materials();
-            let effects = memory_beside(materials, &meta.uses, &file.images(), &request, workers);
-            frames * settings.frame_bytes() + effects
+            let effects = memory_beside(
+                materials,
+                &meta.uses,
+                &file.images(),
+                &request,
+                environment.is_some(),
+                workers,
+            );
+            frames * settings.frame_bytes() + effects + environment.unwrap_or(0)
         };
         self.cache.open(path, within, beside)
     }

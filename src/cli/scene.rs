@@ -151,8 +151,13 @@ impl Scene {
         threads: usize,
         isa: Isa,
     ) -> Result<Self> {
+        /// What the same command takes in one run and not in another: pages of libraries and of the allocator.
+        const RUNS_DIFFER: usize = 1 << 20;
         let start = Instant::now();
-        let cached = Arc::new(Cached::open(file, options, memory, beside + taken_so_far(), threads)?);
+        let beside = beside + taken_so_far();
+        let open = |beside| Cached::open(file, options, memory, beside, threads);
+        // The least memory that a refusal names is to do in the next run.
+        let cached = Arc::new(open(beside).or_else(|_| open(beside + RUNS_DIFFER))?);
         let accel = Accel::of_cached(Arc::clone(&cached)).with_isa(isa);
         let looks = Looks::Cached(CachedSurface::new(cached, file)?);
         Ok(Self::of_file(file, accel, file.meta().stats.clone(), looks, start.elapsed().as_secs_f64()))

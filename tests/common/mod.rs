@@ -6,7 +6,9 @@ use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::process::{Child, ExitStatus, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// Sends a process a signal: `INT`, `KILL`. Whether it could be sent.
@@ -14,6 +16,29 @@ pub fn signal(process: &Child, signal: &str) -> bool {
     let arguments = [format!("-{signal}"), process.id().to_string()];
     let sent = std::process::Command::new("kill").args(arguments).stderr(Stdio::null()).status();
     sent.expect("kill runs").success()
+}
+
+/// Only what hangs takes so long.
+pub const LONG: Duration = Duration::from_secs(120);
+
+/// Waits until something is there. One that takes [`LONG`] fails the test, and ends the process that it hangs with.
+pub fn wait_for<T>(process: &mut Child, what: &str, mut look: impl FnMut(&mut Child) -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = look(process) {
+            return found;
+        }
+        if start.elapsed() > LONG {
+            let _ = process.kill();
+            panic!("{what}: still waited for after {LONG:?}");
+        }
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Waits for the end of a process.
+pub fn end_of(process: &mut Child) -> ExitStatus {
+    wait_for(process, "the end of the process", |process| process.try_wait().expect("it is ours"))
 }
 
 /// A folder that is gone in the end.

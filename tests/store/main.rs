@@ -2,9 +2,14 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(target_os = "linux")]
+mod cut_short;
 #[cfg(unix)]
 mod interrupted;
 mod large;
+#[cfg(unix)]
+mod stages;
+mod together;
 
 use common::Place;
 use serde_json::Value;
@@ -68,9 +73,8 @@ fn pictures_of_a_model_and_of_its_scene_file_are_the_same() {
     }
 }
 
-#[test]
-fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
-    let place = models();
+/// A NumPy file of a hundred rays from above.
+fn rays() -> Vec<u8> {
     let rays: Vec<f32> = (0..100)
         .flat_map(|i| {
             [(i % 10) as f32 * 0.3 - 1.4, 9.0, (i / 10) as f32 * 0.3 - 1.4, 0.0, 0.0, -1.0, 0.0, 99.0]
@@ -81,7 +85,13 @@ fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
     npy.extend(118u16.to_le_bytes());
     npy.extend(format!("{header:<117}\n").as_bytes());
     npy.extend(rays.iter().flat_map(|x| x.to_le_bytes()));
-    place.write("rays.npy", npy);
+    npy
+}
+
+#[test]
+fn hits_of_a_model_and_of_its_scene_file_are_the_same() {
+    let place = models();
+    place.write("rays.npy", rays());
     for model in MODELS {
         place.succeed(&format!("build {model} -o scene.rpk"));
         for any in ["", "--any"] {
@@ -171,8 +181,26 @@ fn a_damaged_scene_file_is_refused_by_every_command() {
     let place = models();
     place.succeed("build faces.ply -o scene.rpk");
     let bytes = place.read("scene.rpk");
-    let commands =
-        ["render broken.rpk -o a.png", "info broken.rpk", "bench broken.rpk", "build broken.rpk -o a.rpk"];
+    place.write("rays.npy", rays());
+    // All that take a scene, and those that take one in another way within --memory.
+    let commands = [
+        "render broken.rpk -o a.png",
+        "render broken.rpk -o a.png --memory 1GiB",
+        "render broken.rpk -o a.png --heatmap steps",
+        "info broken.rpk",
+        "info broken.rpk --verify",
+        "effects broken.rpk",
+        "bench broken.rpk",
+        "bench broken.rpk --build",
+        "accuracy broken.rpk",
+        "tune broken.rpk -o a.toml",
+        "cast broken.rpk --rays rays.npy -o a.npz",
+        "cast broken.rpk --rays rays.npy -o a.npz --memory 1GiB",
+        "cache broken.rpk",
+        "build broken.rpk -o a.rpk",
+        "build broken.rpk -o a.rpk --memory 1MiB",
+        "build faces.ply broken.rpk -o a.rpk",
+    ];
     let refused = |bytes: &[u8], expected: &str| {
         place.write("broken.rpk", bytes);
         for command in commands {

@@ -103,23 +103,31 @@ impl Staged {
 }
 
 /// The memory that a picture may need beside what its scene and its pixels take: the pictures that are opened for it,
-/// and what each of `workers` keeps. They are opened to know.
+/// and what each of `workers` keeps. They are opened to know. What an environment's own picture takes is not in it.
 pub fn memory_beside(
     materials: &[Material],
     uses: &[u64],
     images: &[Image],
     request: &Request,
+    has_environment: bool,
     workers: usize,
 ) -> usize {
     let may_run = Effect::ALL.iter().filter(|&&effect| request.of(effect) != Some(false));
     let set = may_run.fold(EffectSet::NONE, |set, &effect| set.with(effect, true));
-    let is_forced = set.iter().any(|effect| request.of(effect) == Some(true));
-    if !is_forced && !used(materials, uses).any(|material| calls_of(material).has_any(set)) {
+    let is_forced = |effect: &Effect| request.of(*effect) == Some(true);
+    let called_for = used(materials, uses).fold(EffectSet::NONE, |all, material| all.or(calls_of(material)));
+    if !set.iter().any(|effect| is_forced(&effect)) && !called_for.has_any(set) && !has_environment {
         return 0;
     }
+    // What is called for by lights and cameras follows from emission and environments, or makes no more paths.
+    let run = set.iter().filter(|effect| called_for.has(*effect) || is_forced(effect));
+    let run = run.fold(EffectSet::NONE, |run, effect| run.with(effect, true));
+    let run = run.with(Effect::Environment, has_environment);
     let (textures, _) =
         Textures::open(images, used(materials, uses).flat_map(|material| needed(material, set)));
-    textures.bytes() + workers * EffectScratch::BYTES
+    // Surfaces that give off light may call for light by way of others, whatever else is turned off.
+    let run = run.with(Effect::Emission, called_for.has(Effect::Emission));
+    textures.bytes() + workers * EffectScratch::bytes(run)
 }
 
 /// The surfaces that give off light.
@@ -189,6 +197,29 @@ mod tests {
             error: None,
         };
         Staged::new(&accel, mesh, &camera, wishes)
+    }
+
+    #[test]
+    fn memory_beside_is_what_may_run_takes() {
+        let beside = |material: Material, request: &str, has_environment: bool| {
+            let request = request.parse().expect(request);
+            memory_beside(&[material], &[1], &[], &request, has_environment, 16)
+        };
+        let plain = Material::default();
+        let mirror = Material { specular: Vec3::ONE, reflects: true, roughness: 0.0, ..Material::default() };
+        let lamp = Material { emission: Vec3::ONE, ..Material::default() };
+        let varnish = Material { specular: Vec3::ONE, roughness: 0.3, ..Material::default() };
+        assert_eq!(beside(plain.clone(), "auto", false), 0);
+        let few = beside(varnish.clone(), "auto", false);
+        assert!(few > 0);
+        assert_eq!(beside(mirror.clone(), "-reflection,+textures", false), few);
+        let many = beside(mirror, "auto", false);
+        assert!(many > 2 * few, "{many} and {few}");
+        assert_eq!(beside(plain.clone(), "+ambient-occlusion", false), many);
+        assert_eq!(beside(plain, "auto", true), many);
+        assert_eq!(beside(varnish, "auto", true), many);
+        // Its light may come by way of other surfaces.
+        assert_eq!(beside(lamp, "-soft-shadows,-emission,+textures", false), many);
     }
 
     #[test]

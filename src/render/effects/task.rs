@@ -7,7 +7,7 @@ use crate::render::frame::TilePixels;
 use crate::render::sampling::subpixel;
 use crate::render::scatter::{Media, Sequence};
 use crate::render::tile::SQUARE;
-use crate::scene::effects::Effect;
+use crate::scene::effects::{Effect, EffectSet};
 use crate::scene::texture::Cone;
 use crate::scene::{Surface, View};
 use crate::traverse::Dispatch;
@@ -53,8 +53,24 @@ pub struct EffectScratch {
 }
 
 impl EffectScratch {
-    /// About what it takes up: some thousands of paths at once.
-    pub const BYTES: usize = 2 << 20;
+    /// About what it takes up at most, where each path may become several: some thousands of paths at once.
+    const BYTES: usize = 2 << 20;
+    /// The same where paths stay one a pixel, as does light that is looked for: hundreds.
+    const BYTES_STRAIGHT: usize = 512 << 10;
+
+    /// About what it takes up at most while these effects run.
+    pub fn bytes(set: EffectSet) -> usize {
+        const STRAIGHT: EffectSet = EffectSet::NONE
+            .with(Effect::Textures, true)
+            .with(Effect::Bump, true)
+            .with(Effect::SmoothNormals, true)
+            .with(Effect::CutOuts, true)
+            .with(Effect::Highlights, true)
+            .with(Effect::Shadows, true)
+            .with(Effect::DepthOfField, true)
+            .with(Effect::Antialiasing, true);
+        if set.or(STRAIGHT) == STRAIGHT { Self::BYTES_STRAIGHT } else { Self::BYTES }
+    }
 
     /// Empty, with what has been learnt before about kernels.
     pub fn new(learnt: Dispatch, counts: bool) -> Self {
