@@ -87,7 +87,6 @@ fn interrupt(how: &str) {
     let old = place.read("old.rpk");
     for (number, Build { command, stages }) in BUILDS.iter().enumerate() {
         place.succeed(command);
-        let new = place.read("scene.rpk");
         for (turn, stage) in stages.iter().enumerate() {
             let what = format!("{how}, {command} at {stage}");
             let has_old = (turn + number) % 2 == 0;
@@ -109,8 +108,8 @@ fn interrupt(how: &str) {
             assert_eq!(is_there, has_old || *stage == "named", "{what}");
             assert_eq!(others.len(), 3 + usize::from(is_there), "{what}: {others:?}");
             if is_there {
-                let expected = if *stage == "named" { &new } else { &old };
-                assert!(place.read("scene.rpk") == *expected, "{what}");
+                // A new one says how much memory its build took, which is not always the same.
+                assert_eq!(place.read("scene.rpk") == old, *stage != "named", "{what}");
                 place.succeed("info scene.rpk --verify");
             }
             place.write("scene.rpk", &old);
