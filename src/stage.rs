@@ -14,6 +14,7 @@ use std::thread;
 static STOP: OnceLock<Stage> = OnceLock::new();
 
 /// What a build that is under way is about to do.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "the command line begins some"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Make a model by rule.
@@ -45,6 +46,7 @@ pub enum Stage {
 }
 
 impl Stage {
+    #[cfg(feature = "cli")]
     const ALL: [Self; 13] = [
         Self::Generating,
         Self::Reading,
