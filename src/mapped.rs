@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 pub struct Map {
     map: Mmap,
     /// Its place in the list, and the name that stands there; none if the list was full.
+    #[expect(clippy::box_collection, reason = "the name stays where it is when the map moves")]
     listed: Option<(usize, Box<String>)>,
 }
 
