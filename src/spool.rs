@@ -167,9 +167,17 @@ impl<T: NoUninit + AnyBitPattern> Spooled<T> {
     /// # Errors
     /// The file cannot be read.
     pub fn of_corners(&self, corners: &[[u32; 3]]) -> io::Result<Vec<[T; 3]>> {
+        self.of_places(corners)
+    }
+
+    /// The values at places in any order, some of which may be the same, so many at a time.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of_places<const N: usize>(&self, wanted: &[[u32; N]]) -> io::Result<Vec<[T; N]>> {
         /// So many values are read for each that is wanted, if they lie together.
         const DENSE: usize = 4;
-        let all = corners.as_flattened();
+        let all = wanted.as_flattened();
         let (Some(&first), Some(&last)) = (all.iter().min(), all.iter().max()) else {
             return Ok(Vec::new());
         };
@@ -178,14 +186,14 @@ impl<T: NoUninit + AnyBitPattern> Spooled<T> {
             let mut values = vec![T::zeroed(); span];
             self.read(first as usize, &mut values)?;
             let value = |place: u32| values[(place - first) as usize];
-            return Ok(corners.iter().map(|corners| corners.map(value)).collect());
+            return Ok(wanted.iter().map(|places| places.map(value)).collect());
         }
         let mut places = all.to_vec();
         places.sort_unstable();
         places.dedup();
         let values = self.scattered(&places)?;
         let value = |place: u32| values[places.binary_search(&place).expect("all were read")];
-        Ok(corners.iter().map(|corners| corners.map(value)).collect())
+        Ok(wanted.iter().map(|places| places.map(value)).collect())
     }
 }
 

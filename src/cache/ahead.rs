@@ -86,7 +86,7 @@ impl Blocks {
             return;
         }
         let gone = &mut |gone| {
-            add(&self.counters.evictions, 1);
+            add(&self.counters_of(gone).evictions, 1);
             self.let_go(gone);
         };
         if self.directory(block).ask(block, &self.words, &self.pins, gone) != Asked::Absent {

@@ -19,7 +19,7 @@ use super::quota::Quota;
 use super::retired::Retired;
 use super::slots::Slots;
 use super::source::Source;
-use super::stats::{CacheStats, Counters, add, nanos};
+use super::stats::{CacheStats, Counters, PARTS, PartCounters, PartStats, add, nanos};
 use super::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, Ordering, PoisonError};
 use super::whole::Whole;
 use super::words::Words;
@@ -103,7 +103,7 @@ impl Blocks {
         let gate = matches!(options.loading, Loading::Asynchronous { .. }).then(|| Gate::new(threads));
         let blocks = Arc::new(Self {
             slots: Slots::new(count, plan.all, layout.shift())?,
-            words: Words::new(count),
+            words: Words::new(count, layout.first_of_leaves()),
             epochs: Epochs::new(READERS),
             gate,
             sessions: AtomicU32::new(0),
@@ -199,15 +199,20 @@ impl Blocks {
     }
 
     pub fn directory(&self, block: u32) -> &Directory {
-        let second = block as usize >= self.layout.first_of_leaves();
+        let second = self.layout.part(block) == 1;
         let [first, other] = &self.directories;
         other.as_ref().filter(|_| second).or(first.as_ref()).expect("there is a first directory")
+    }
+
+    /// The counts of the part that a block is of.
+    pub fn counters_of(&self, block: u32) -> &PartCounters {
+        &self.counters.parts[self.layout.part(block)]
     }
 
     /// Takes note of a block that has been declared gone. Its stripe is locked: nobody can have asked for it
     /// again, who would not find it here.
     pub(super) fn retire(&self, gone: u32) {
-        add(&self.counters.evictions, 1);
+        add(&self.counters_of(gone).evictions, 1);
         self.gone.fetch_add(1, Ordering::Relaxed);
         self.frame_tick.store(BY_SQUARES, Ordering::Relaxed);
         self.let_go(gone);
@@ -306,9 +311,10 @@ impl Blocks {
                 // SAFETY: the directory tells one thread alone to load a block.
                 unsafe { self.slots.put(block, bytes, || self.epochs.earliest()) };
             }
-            add(&self.counters.loads, blocks.len() as u64);
+            let counters = self.counters_of(blocks.start);
+            add(&counters.loads, blocks.len() as u64);
             let end = self.layout.column(array).bytes.min(pieces.end * PIECE);
-            add(&self.counters.bytes_read, (end - pieces.start * PIECE) as u64);
+            add(&counters.bytes_read, (end - pieces.start * PIECE) as u64);
             add(&self.counters.loading_ns, nanos(start.elapsed()));
         }
         pieces::put_back(room);
@@ -329,6 +335,11 @@ impl Blocks {
 
     /// What was done since the last call.
     pub fn take_stats(&self) -> CacheStats {
+        self.take_stats_by_part().0
+    }
+
+    /// The same, and what of it was done for nodes and for what leaves need.
+    pub fn take_stats_by_part(&self) -> (CacheStats, [PartStats; PARTS]) {
         self.counters.take(self.words.take_uses(), self.words.take_ahead())
     }
 

@@ -346,7 +346,7 @@ mod tests {
     impl Small {
         fn new(sets: usize, ways: usize) -> Self {
             let shape = Shape { stripes: 1, sets, ways, policy: Replacement::Fifo };
-            Self { directory: Directory::new(shape), words: Words::new(200), pins: Pins::new(200) }
+            Self { directory: Directory::new(shape), words: Words::new(200, 0), pins: Pins::new(200) }
         }
 
         fn pin(&self, block: u32) -> (Asked, Vec<u32>) {

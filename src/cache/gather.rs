@@ -3,7 +3,7 @@
 use super::blocks::Blocks;
 use super::directory::Asked;
 use super::loaders::Loaders;
-use super::stats::add;
+use super::stats::{PARTS, add};
 use super::sync::Ordering;
 
 /// Blocks were not here when the time was over.
@@ -54,12 +54,12 @@ impl Blocks {
             self.quota.take(wanted.len())
         });
         let mut gathered = Gathered { blocks: self, pinned: Vec::with_capacity(wanted.len()), taken };
-        let (mut absent, mut missed) = (Vec::new(), 0);
+        let (mut absent, mut missed) = (Vec::new(), [0; PARTS]);
         for &block in wanted {
             let gone = &mut |gone| self.retire(gone);
             let asked = self.directory(block).pin(block, &self.words, &self.pins, gone);
             gathered.pinned.push(block);
-            missed += u64::from(asked != Asked::Here);
+            missed[self.layout.part(block)] += u64::from(asked != Asked::Here);
             match asked {
                 // It may have come ahead of need since it was looked for.
                 Asked::Here => self.words.use_first(block as usize, self.tick()),
@@ -86,7 +86,8 @@ impl Blocks {
                 None => self.need(loaders, block),
             }
         }
-        add(&self.counters.misses, missed);
+        let counts = self.counters.parts.iter().zip(missed).filter(|&(_, missed)| missed > 0);
+        counts.for_each(|(part, missed)| add(&part.misses, missed));
         for &block in wanted {
             while !self.words.is_here(block as usize) {
                 step_aside();

@@ -131,6 +131,11 @@ impl Layout {
     pub const fn first_of_leaves(&self) -> usize {
         self.columns[Array::References as usize].base >> self.shift
     }
+
+    /// Which part a block is of: 0 for nodes, 1 for what leaves need.
+    pub const fn part(&self, block: u32) -> usize {
+        (block as usize >= self.first_of_leaves()) as usize
+    }
 }
 
 #[cfg(test)]

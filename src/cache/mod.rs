@@ -84,7 +84,7 @@ pub(crate) use glance::Glance;
 pub use layout::Array;
 pub use plan::{CacheOptions, Loading, Plan, Prefetch};
 pub use source::Source;
-pub use stats::CacheStats;
+pub use stats::{CacheStats, PartStats};
 pub use view::View;
 
 use crate::column::Column;
@@ -398,6 +398,18 @@ impl Cached {
     /// What the cache did since the last call.
     pub fn take_stats(&self) -> CacheStats {
         self.blocks.take_stats()
+    }
+
+    /// The same; and where nodes have a cache of their own, what that one did and what the leaves' did.
+    pub fn take_stats_by_cache(&self) -> (CacheStats, Option<[PartStats; 2]>) {
+        let (all, parts) = self.blocks.take_stats_by_part();
+        (all, self.options.nodes.map(|_| parts))
+    }
+
+    /// The most bytes of blocks that each cache holds, beside those that are pinned or on their way out: one, or the
+    /// nodes' and the leaves'.
+    pub fn cache_bytes(&self) -> impl Iterator<Item = usize> {
+        self.plan.shapes.iter().flatten().map(|shape| shape.blocks() * self.options.block)
     }
 
     /// From now on, takes note of uses, or no longer does.

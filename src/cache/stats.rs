@@ -34,19 +34,55 @@ pub struct CacheStats {
 impl CacheStats {
     /// The share of uses that did not wait for their block.
     pub fn hit_ratio(&self) -> f64 {
-        // Who waits for two blocks may miss one of them twice.
-        if self.uses == 0 { 1.0 } else { (1.0 - self.misses as f64 / self.uses as f64).max(0.0) }
+        hit_ratio(self.uses, self.misses)
     }
+}
+
+/// What can have a cache of its own: nodes, and what leaves need.
+pub const PARTS: usize = 2;
+
+/// Counts of the nodes' part of a cache's work, or of the leaves' part, since they were last taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PartStats {
+    /// Uses of blocks: see [`CacheStats::uses`].
+    pub uses: u64,
+    /// Blocks that were waited for.
+    pub misses: u64,
+    /// Blocks that were read.
+    pub loads: u64,
+    /// Bytes that were read.
+    pub bytes_read: u64,
+    /// Blocks that made room.
+    pub evictions: u64,
+}
+
+impl PartStats {
+    /// The share of uses that did not wait for their block.
+    pub fn hit_ratio(&self) -> f64 {
+        hit_ratio(self.uses, self.misses)
+    }
+}
+
+fn hit_ratio(uses: u64, misses: u64) -> f64 {
+    // Who waits for two blocks may miss one of them twice.
+    if uses == 0 { 1.0 } else { (1.0 - misses as f64 / uses as f64).max(0.0) }
 }
 
 /// The same, while it is counted. Each in a line of the processor's caches: threads that wait count some of them, and
 /// loaders others.
 #[derive(Debug, Default)]
-pub struct Counters {
+pub struct PartCounters {
     pub misses: CachePadded<AtomicU64>,
     pub loads: CachePadded<AtomicU64>,
     pub bytes_read: CachePadded<AtomicU64>,
     pub evictions: CachePadded<AtomicU64>,
+}
+
+/// What a cache did, while it is counted.
+#[derive(Debug, Default)]
+pub struct Counters {
+    /// Of nodes, and of what leaves need.
+    pub parts: [PartCounters; PARTS],
     pub prefetched: CachePadded<AtomicU64>,
     pub stalled_ns: CachePadded<AtomicU64>,
     pub loading_ns: CachePadded<AtomicU64>,
@@ -63,21 +99,36 @@ pub fn nanos(time: Duration) -> u64 {
 }
 
 impl Counters {
-    /// The counts so far, beside so many uses, and so many blocks that came ahead of need and were used, and went
-    /// unused; begins again from 0. Those have to be taken before: no block is among them that is not counted here.
-    pub fn take(&self, uses: u64, [prefetched_used, prefetched_unused]: [u64; 2]) -> CacheStats {
+    /// The counts so far, of all and by part, beside so many uses, and so many blocks that came ahead of need and were
+    /// used, and went unused; begins again from 0. Those have to be taken before: no block is among them that is not
+    /// counted here.
+    pub fn take(
+        &self,
+        uses: [u64; PARTS],
+        [prefetched_used, prefetched_unused]: [u64; 2],
+    ) -> (CacheStats, [PartStats; PARTS]) {
         let take = |counter: &AtomicU64| counter.swap(0, Ordering::Relaxed);
-        CacheStats {
-            uses,
-            misses: take(&self.misses),
-            loads: take(&self.loads),
-            bytes_read: take(&self.bytes_read),
-            evictions: take(&self.evictions),
+        let mut parts = self.parts.each_ref().map(|part| PartStats {
+            uses: 0,
+            misses: take(&part.misses),
+            loads: take(&part.loads),
+            bytes_read: take(&part.bytes_read),
+            evictions: take(&part.evictions),
+        });
+        parts.iter_mut().zip(uses).for_each(|(part, uses)| part.uses = uses);
+        let sum = |of: fn(&PartStats) -> u64| parts.iter().map(of).sum();
+        let all = CacheStats {
+            uses: sum(|part| part.uses),
+            misses: sum(|part| part.misses),
+            loads: sum(|part| part.loads),
+            bytes_read: sum(|part| part.bytes_read),
+            evictions: sum(|part| part.evictions),
             prefetched: take(&self.prefetched),
             prefetched_used,
             prefetched_unused,
             stalled: take(&self.stalled_ns) as f64 * 1e-9,
             loading: take(&self.loading_ns) as f64 * 1e-9,
-        }
+        };
+        (all, parts)
     }
 }

@@ -13,6 +13,7 @@
 //! all.
 
 use super::policy::Use;
+use super::stats::PARTS;
 use super::sync::{AtomicBool, AtomicU32, AtomicU64, Mutex, MutexGuard, Ordering, PoisonError};
 use crossbeam::utils::CachePadded;
 use std::cell::{Cell, RefCell};
@@ -35,8 +36,11 @@ pub struct Words {
     tracing: AtomicBool,
     /// Whether that is all of them, and not only each block's first one since it came.
     tracing_all: AtomicBool,
-    /// First uses in a tick, by threads and loaders: those that count at the same time do not wait for one another.
-    uses: [CachePadded<AtomicU64>; COUNTERS],
+    /// First uses in a tick of nodes and of what leaves need, by threads and loaders: those that count at the same time do
+    /// not wait for one another.
+    uses: [CachePadded<[AtomicU64; PARTS]>; COUNTERS],
+    /// The first block of what leaves need.
+    first_of_leaves: usize,
     /// Blocks that came ahead of need: those that were used afterwards, and those that went unused.
     ahead: CachePadded<[AtomicU64; 2]>,
 }
@@ -45,7 +49,7 @@ pub struct Words {
 /// count and to write down each at once would have threads wait for one another.
 #[derive(Debug, Default)]
 pub struct Notes {
-    uses: Cell<u64>,
+    uses: [Cell<u64>; PARTS],
     trace: RefCell<Vec<u32>>,
 }
 
@@ -56,8 +60,8 @@ const fn was_used(word: u32, tick: u32) -> bool {
 }
 
 impl Words {
-    /// No block is here.
-    pub fn new(blocks: usize) -> Self {
+    /// No block is here. From `first_of_leaves` on, they are of what leaves need.
+    pub fn new(blocks: usize, first_of_leaves: usize) -> Self {
         let words = (0..blocks).map(|_| AtomicU32::new(0)).collect();
         Self {
             words,
@@ -65,6 +69,7 @@ impl Words {
             tracing: AtomicBool::new(false),
             tracing_all: AtomicBool::new(false),
             uses: Default::default(),
+            first_of_leaves,
             ahead: CachePadded::default(),
         }
     }
@@ -101,7 +106,8 @@ impl Words {
             match self.words[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
                 Ok(_) => {
                     self.count_ahead(word, 0);
-                    notes.uses.set(notes.uses.get() + 1);
+                    let uses = &notes.uses[self.part(block)];
+                    uses.set(uses.get() + 1);
                     if self.is_traced(word & UNUSED != 0) {
                         notes.trace.borrow_mut().push(block as u32);
                     }
@@ -113,6 +119,11 @@ impl Words {
         false
     }
 
+    /// Which part a block is of: see [`Layout::part`](super::layout::Layout::part).
+    fn part(&self, block: usize) -> usize {
+        usize::from(block >= self.first_of_leaves)
+    }
+
     /// Whether a use is written down, which may be a block's first one since it came.
     fn is_traced(&self, is_first: bool) -> bool {
         self.is_tracing_all() || is_first && self.is_tracing()
@@ -121,9 +132,12 @@ impl Words {
     /// Takes over what a thread has noted, with so many first uses more, which were of lists that are known to be here.
     /// Threads with other numbers do not wait for this one.
     pub fn hand_over(&self, notes: &Notes, more: u64, thread: usize) {
-        let uses = notes.uses.take() + more;
-        if uses > 0 {
-            self.uses[thread % COUNTERS].fetch_add(uses, Ordering::Relaxed);
+        let [nodes, leaves] = notes.uses.each_ref().map(Cell::take);
+        // Lists are what leaves need.
+        for (count, uses) in self.uses[thread % COUNTERS].iter().zip([nodes, leaves + more]) {
+            if uses > 0 {
+                count.fetch_add(uses, Ordering::Relaxed);
+            }
         }
         let mut trace = notes.trace.borrow_mut();
         if !trace.is_empty() {
@@ -162,9 +176,13 @@ impl Words {
         self.tracing.load(Ordering::Relaxed)
     }
 
-    /// First uses in a tick since the last call.
-    pub fn take_uses(&self) -> u64 {
-        self.uses.iter().map(|uses| uses.swap(0, Ordering::Relaxed)).sum()
+    /// First uses in a tick since the last call, of nodes and of what leaves need.
+    pub fn take_uses(&self) -> [u64; PARTS] {
+        let mut sums = [0; PARTS];
+        for uses in &self.uses {
+            sums.iter_mut().zip(uses.iter()).for_each(|(sum, uses)| *sum += uses.swap(0, Ordering::Relaxed));
+        }
+        sums
     }
 
     /// Blocks that came ahead of need since the last call: those that were used, and those that went unused.
@@ -204,7 +222,7 @@ impl Words {
     /// Says that a block is here, used once; all that was written to it before is seen by who sees that.
     pub fn arrive(&self, block: usize, tick: u32) -> Use {
         self.words[block].store(HERE | ONE | (tick & TICK), Ordering::Release);
-        self.uses[block % COUNTERS].fetch_add(1, Ordering::Relaxed);
+        self.uses[block % COUNTERS][self.part(block)].fetch_add(1, Ordering::Relaxed);
         if self.is_traced(true) {
             self.trace().push(block as u32);
         }
@@ -247,6 +265,16 @@ impl Words {
 mod tests {
     use super::*;
 
+    /// Words of blocks that are all of what leaves need but for the first.
+    fn words(blocks: usize) -> Words {
+        Words::new(blocks, 1)
+    }
+
+    /// First uses since the last call.
+    fn take_uses(words: &Words) -> u64 {
+        words.take_uses().iter().sum()
+    }
+
     /// A use that is handed over at once.
     fn use_in(words: &Words, block: usize, tick: u32) -> bool {
         let notes = Notes::default();
@@ -257,7 +285,7 @@ mod tests {
 
     #[test]
     fn uses_are_counted_by_tick() {
-        let words = Words::new(2);
+        let words = words(2);
         assert!(!use_in(&words, 1, 7));
         words.arrive(1, 7);
         assert_eq!(words.uses(1), Use { tick: 7, count: 1 });
@@ -281,13 +309,13 @@ mod tests {
 
     #[test]
     fn first_uses_alone_are_written_down_where_that_will_do() {
-        let words = Words::new(2);
+        let words = words(2);
         words.trace_uses(true, false);
         assert!(!words.is_tracing_all());
         words.arrive(0, 1);
         words.arrive_ahead(1, 1);
         assert!((2..5).all(|tick| use_in(&words, 0, tick) && use_in(&words, 1, tick)));
-        assert_eq!((words.take_trace(), words.take_uses()), (vec![0, 1], 7));
+        assert_eq!((words.take_trace(), take_uses(&words)), (vec![0, 1], 7));
         words.trace_uses(true, true);
         assert!(words.is_tracing_all() && use_in(&words, 1, 5));
         words.trace_uses(false, true);
@@ -297,31 +325,43 @@ mod tests {
 
     #[test]
     fn a_thread_s_notes_are_its_own_until_it_hands_them_over() {
-        let (words, notes) = (Words::new(3), [(); 2].map(|()| Notes::default()));
+        let (words, notes) = (words(3), [(); 2].map(|()| Notes::default()));
         words.trace_uses(true, true);
         for block in 0..3 {
             words.arrive(block, 0);
         }
-        assert_eq!((words.take_trace(), words.take_uses()), (vec![0, 1, 2], 3));
+        assert_eq!((words.take_trace(), take_uses(&words)), (vec![0, 1, 2], 3));
         assert!(
             words.use_in(2, 1, &notes[0]) && words.use_in(1, 1, &notes[1]) && words.use_in(0, 1, &notes[0])
         );
-        assert_eq!((words.take_trace(), words.take_uses()), (vec![], 0));
+        assert_eq!((words.take_trace(), take_uses(&words)), (vec![], 0));
         words.hand_over(&notes[0], 7, 1);
-        assert_eq!((words.take_trace(), words.take_uses()), (vec![2, 0], 9));
+        assert_eq!((words.take_trace(), take_uses(&words)), (vec![2, 0], 9));
         words.hand_over(&notes[0], 0, 1);
         words.hand_over(&notes[1], 0, 0);
-        assert_eq!((words.take_trace(), words.take_uses()), (vec![1], 1));
+        assert_eq!((words.take_trace(), take_uses(&words)), (vec![1], 1));
+    }
+
+    #[test]
+    fn uses_of_nodes_and_of_what_leaves_need_are_counted_apart() {
+        let (words, notes) = (words(3), Notes::default());
+        words.arrive(0, 0);
+        words.arrive_ahead(1, 0);
+        words.arrive(2, 0);
+        assert_eq!(words.take_uses(), [1, 1]);
+        assert!(words.use_in(0, 1, &notes) && words.use_in(0, 2, &notes) && words.use_in(1, 2, &notes));
+        words.hand_over(&notes, 5, 0);
+        assert_eq!((words.take_uses(), words.take_uses()), ([2, 6], [0, 0]));
     }
 
     #[test]
     fn what_came_ahead_of_need_is_used_or_not() {
-        let words = Words::new(5);
+        let words = words(5);
         for block in 0..4 {
             assert_eq!(words.arrive_ahead(block, 0), Use { tick: 0, count: 1 });
             assert!(words.is_here(block));
         }
-        assert_eq!((words.take_uses(), words.take_ahead()), (0, [0, 0]));
+        assert_eq!((take_uses(&words), words.take_ahead()), (0, [0, 0]));
         // Used in the tick in which it came, once; used by who pins it; gone unused, in both ways; used at once.
         assert!(use_in(&words, 0, 0) && use_in(&words, 0, 0) && use_in(&words, 0, 1));
         words.use_first(1, 0);
@@ -330,7 +370,7 @@ mod tests {
         assert!(!words.leave_unused(2) && !words.is_here(2));
         words.leave(3);
         words.arrive_used(4, 0);
-        assert_eq!((words.take_uses(), words.take_ahead()), (4, [3, 2]));
+        assert_eq!((take_uses(&words), words.take_ahead()), (4, [3, 2]));
         assert_eq!(words.uses(1), Use { tick: 0, count: 1 });
         (0..5).for_each(|block| words.leave(block));
         assert_eq!(words.take_ahead(), [0, 0]);
@@ -338,12 +378,12 @@ mod tests {
 
     #[test]
     fn a_use_that_began_in_any_tick_is_the_first_one() {
-        let words = Words::new(1);
+        let words = words(1);
         for tick in [0, 1, 6, 7, 8, TICK] {
             words.arrive_ahead(0, 7);
             assert!(use_in(&words, 0, tick) && !words.is_unused(0), "{tick}");
             words.leave(0);
         }
-        assert_eq!((words.take_uses(), words.take_ahead()), (6, [6, 0]));
+        assert_eq!((take_uses(&words), words.take_ahead()), (6, [6, 0]));
     }
 }

@@ -1,9 +1,10 @@
 //! How a scene is held that is not all in memory.
 
+use super::memory::MemoryReport;
 use super::report::{Lines, bytes, counted, grouped};
 use super::scene::Scene;
 use crate::cache::policy::Replacement;
-use crate::cache::{CacheOptions, CacheStats, Cached, Loading, Prefetch};
+use crate::cache::{CacheOptions, CacheStats, Cached, Loading, PartStats, Prefetch};
 use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 use crate::simd::Isa;
@@ -150,10 +151,9 @@ fn nodes(text: &str) -> Result<(f32, Replacement)> {
 /// What a report says about a scene that is not all in memory.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CacheReport {
-    /// The memory that the process might take.
-    pub budget: usize,
-    /// The most that it took, where the system says.
-    pub peak_resident: Option<u64>,
+    /// The memory that the process might take, and did.
+    #[serde(flatten)]
+    pub memory: MemoryReport,
     /// The most that blocks took of that.
     pub peak_blocks: usize,
     /// Bytes of all blocks of the scene.
@@ -165,28 +165,54 @@ pub struct CacheReport {
     /// What the cache did.
     #[serde(flatten)]
     pub stats: CacheStats,
+    /// That of the nodes and that of the leaves, if they are two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub caches: Option<[OneCache; 2]>,
+}
+
+/// What one of two caches did.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct OneCache {
+    /// What is in it: `nodes`, or `leaves` with their triangles.
+    pub of: &'static str,
+    /// Which block makes room for another.
+    pub policy: Replacement,
+    /// The most bytes of blocks that it holds, beside those that are pinned or on their way out.
+    pub bytes: usize,
+    /// The share of uses that did not wait for their block.
+    pub hit_ratio: f64,
+    /// What it did.
+    #[serde(flatten)]
+    pub stats: PartStats,
 }
 
 impl CacheReport {
     /// What there is to say at the end.
-    pub fn new(budget: usize, cached: &Cached) -> Self {
-        let stats = cached.take_stats();
+    pub fn new(memory: MemoryReport, cached: &Cached) -> Self {
+        let (stats, parts) = cached.take_stats_by_cache();
+        let options = *cached.options();
+        let caches = parts.zip(options.nodes).map(|([nodes, leaves], (_, policy))| {
+            let mut sizes = cached.cache_bytes();
+            [("nodes", policy, nodes), ("leaves", options.policy, leaves)].map(|(of, policy, stats)| {
+                let bytes = sizes.next().unwrap_or_default();
+                OneCache { of, policy, bytes, hit_ratio: stats.hit_ratio(), stats }
+            })
+        });
         Self {
-            budget,
-            peak_resident: resident::peak(),
+            memory,
             peak_blocks: cached.memory_bytes()[1],
             data: cached.data_bytes(),
-            options: *cached.options(),
+            options,
             hit_ratio: stats.hit_ratio(),
             stats,
+            caches,
         }
     }
 
     /// The same in words.
     pub fn describe(&self, lines: &mut Lines) {
-        let [budget, blocks, data] = [self.budget, self.peak_blocks, self.data].map(|n| bytes(n as u64));
-        let peak = self.peak_resident.map_or("an unknown part".into(), bytes);
-        lines.add("memory", format!("{peak} of {budget} at most; blocks {blocks} of {data}"));
+        let [blocks, data] = [self.peak_blocks, self.data].map(|n| bytes(n as u64));
+        self.memory.describe(lines, &format!("; blocks {blocks} of {data}"));
         let CacheOptions { policy, block, loading, .. } = self.options;
         let who = match loading {
             Loading::Synchronous => "read by who needs them".into(),
@@ -204,6 +230,18 @@ impl CacheReport {
                 bytes(bytes_read),
             ),
         );
+        for OneCache { of, policy, bytes: size, hit_ratio, stats } in self.caches.iter().flatten() {
+            lines.add(
+                "",
+                format!(
+                    "{of}: {policy} in {}, {:.2} % of uses hit, {} blocks ({}) read",
+                    bytes(*size as u64),
+                    hit_ratio * 100.0,
+                    grouped(stats.loads),
+                    bytes(stats.bytes_read),
+                ),
+            );
+        }
         if prefetched > 0 {
             let [all, used, unused] = [prefetched, prefetched_used, prefetched_unused].map(grouped);
             lines.add(
@@ -211,6 +249,14 @@ impl CacheReport {
                 format!("{all} blocks came before they were needed: {used} used, {unused} given up unused"),
             );
         }
+    }
+}
+
+/// What there is to say in the end about the memory, and about the cache if there was one.
+pub fn describe_memory(lines: &mut Lines, memory: &MemoryReport, cache: Option<&CacheReport>) {
+    match cache {
+        Some(cache) => cache.describe(lines),
+        None => memory.describe(lines, ""),
     }
 }
 

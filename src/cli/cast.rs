@@ -1,6 +1,7 @@
 //! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
 
-use super::cache_options::{CacheArgs, CacheReport, Within};
+use super::cache_options::{CacheArgs, CacheReport, Within, describe_memory};
+use super::memory::MemoryReport;
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
@@ -104,7 +105,9 @@ struct Report<'a> {
     /// Seconds of writing the answers.
     write_seconds: f64,
     output: &'a Path,
-    /// What became of the memory, if the scene is not all in it.
+    /// The memory that was given, and the most that was taken.
+    memory: MemoryReport,
+    /// What became of it, if the scene is not all in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     cache: Option<CacheReport>,
 }
@@ -143,6 +146,7 @@ pub fn run(args: &Args) -> Result<()> {
 
     let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
     let (traced, hits, write_seconds) = args.cast(&batch, &rays, &scene)?;
+    let (memory, cache) = scene.memory_report(&args.build)?;
     let report = Report {
         engine: ENGINE,
         scene: scene.report(),
@@ -158,7 +162,8 @@ pub fn run(args: &Args) -> Result<()> {
         rays_read_seconds,
         write_seconds,
         output: &args.output,
-        cache: scene.cache_report(&args.build)?,
+        memory,
+        cache,
     };
     args.json.give(&args.text(&scene, &report), &report)
 }
@@ -265,9 +270,7 @@ impl Args {
         );
         lines.add("hits", grouped(report.hits));
         lines.add("wrote", format!("{} in {}", self.output.display(), duration(report.write_seconds)));
-        if let Some(cache) = &report.cache {
-            cache.describe(&mut lines);
-        }
+        describe_memory(&mut lines, &report.memory, report.cache.as_ref());
         lines.text().to_owned()
     }
 }

@@ -16,6 +16,7 @@ mod histogram;
 mod info;
 mod interrupt;
 mod looks;
+mod memory;
 mod model;
 mod options;
 mod outputs;

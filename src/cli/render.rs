@@ -202,7 +202,7 @@ impl Args {
                 shown,
                 &costs(cost),
                 self.outputs.picture(),
-                &self.json,
+                (&self.build, &self.json),
             );
         };
         match &scene.looks {
@@ -235,7 +235,8 @@ impl Args {
         let counts =
             watch("counting", fraction, || renderer.counts_of(effect, &camera, &lighting, &tiles_done))?;
         let shown = heat::Shown::Effect(effect);
-        heat::give(scene, camera, size, shown, &counts, self.outputs.picture(), &self.json)
+        let options = (&self.build, &self.json);
+        heat::give(scene, camera, size, shown, &counts, self.outputs.picture(), options)
     }
 
     /// Renders a frame for each camera, the first of which the light is made for, and reports.
@@ -284,13 +285,13 @@ impl Args {
             }
             Ok::<(), Error>(())
         })?;
-        let cache = scene.cache_report(&self.build)?;
+        let memory = scene.memory_report(&self.build)?;
         let report = Report::new(
             scene,
             renderer.settings(),
             self.build.name(),
             shots,
-            cache,
+            memory,
             &staged.analysis.effects,
         );
         self.json.give(&report.text(scene), &report)

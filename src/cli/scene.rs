@@ -1,6 +1,7 @@
 //! What commands trace: a model and its tree, just built, or a scene file.
 
 use super::cache_options::{CacheReport, taken_so_far};
+use super::memory::MemoryReport;
 use super::model::Model;
 use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
@@ -211,13 +212,15 @@ impl Scene {
         }
     }
 
-    /// What there is to say about the memory given, in the end, if a part of the scene is in memory.
+    /// What there is to say in the end about the memory given and taken; and about the cache, if a part of the scene is in
+    /// memory.
     ///
     /// # Errors
     /// The memory given is no size.
-    pub fn cache_report(&self, options: &BuildOptions) -> Result<Option<CacheReport>> {
-        let cached = self.accel.cached().zip(options.limit()?);
-        Ok(cached.map(|(cached, budget)| CacheReport::new(budget, cached)))
+    pub fn memory_report(&self, options: &BuildOptions) -> Result<(MemoryReport, Option<CacheReport>)> {
+        let memory = MemoryReport::new(options)?;
+        let cache = self.accel.cached().map(|cached| CacheReport::new(memory, cached));
+        Ok((memory, cache))
     }
 
     /// The report's part about model and tree.

@@ -94,11 +94,13 @@ fn refuse_non_finite(mesh: &Mesh, used: &[bool]) -> Result<(), Unusable> {
 /// Counts triangles whose corners lie on one line (in double precision, in which products of
 /// coordinate differences do not underflow).
 fn count_zero_area(mesh: &Mesh) -> u64 {
-    let flat = |t: &&[u32; 3]| {
-        let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
-        (b - a).cross(c - a) == glam::DVec3::ZERO
-    };
-    mesh.triangles.iter().filter(flat).count() as u64
+    mesh.triangles.iter().filter(|t| is_flat(t.map(|i| mesh.positions[i as usize]))).count() as u64
+}
+
+/// Whether corners lie on one line.
+pub(super) fn is_flat(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    (b - a).cross(c - a) == glam::DVec3::ZERO
 }
 
 fn drop_unused(mesh: &mut Mesh, used: &[bool], report: &mut ReadReport) {

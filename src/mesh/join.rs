@@ -27,11 +27,7 @@ impl Mesh {
         unify(&mut meshes);
         let count = |of: fn(&Self) -> usize| meshes.iter().map(of).sum::<usize>();
         let (triangles, vertices) = (count(|mesh| mesh.triangles.len()), count(|mesh| mesh.positions.len()));
-        if triangles > MAX_TRIANGLES || vertices > u32::MAX as usize {
-            return Err(Error::Mesh(format!(
-                "{triangles} triangles with {vertices} vertices are more than one scene can have: leave models out"
-            )));
-        }
+        check_size(triangles, vertices)?;
         let with_attributes = meshes.iter().any(|mesh| !mesh.attributes.is_empty());
         let mut meshes = meshes.into_iter();
         let mut all = meshes.next().unwrap_or_default();
@@ -50,14 +46,32 @@ impl Mesh {
                 all.attributes.resize(all.triangles.len(), Attributes::NONE);
             }
             if let Colors::PerMaterial { materials, .. } = &mut mesh.colors {
-                let maps = materials.iter_mut().flat_map(|material| material.maps.all_mut());
-                maps.for_each(|map| map.image += first_image);
+                shift_images(materials, first_image);
             }
             all.images.extend(mesh.images);
             append(&mut all.colors, mesh.colors);
         }
         Ok(all)
     }
+}
+
+/// Whether one mesh can have so many triangles and vertices.
+///
+/// # Errors
+/// It cannot.
+pub(super) fn check_size(triangles: usize, vertices: usize) -> Result<()> {
+    if triangles > MAX_TRIANGLES || vertices > u32::MAX as usize {
+        return Err(Error::Mesh(format!(
+            "{triangles} triangles with {vertices} vertices are more than one scene can have: leave models out"
+        )));
+    }
+    Ok(())
+}
+
+/// Has materials' maps name pictures before which there are so many more now.
+pub(super) fn shift_images(materials: &mut [Material], first: u32) {
+    let maps = materials.iter_mut().flat_map(|material| material.maps.all_mut());
+    maps.for_each(|map| map.image += first);
 }
 
 /// Adds colours of the same kind.
@@ -78,28 +92,66 @@ fn append(all: &mut Colors, more: Colors) {
     }
 }
 
-/// Gives all meshes colours of one kind.
-fn unify(meshes: &mut [Mesh]) {
-    let alike = |pair: &[Mesh]| match (&pair[0].colors, &pair[1].colors) {
-        (Colors::Uniform(one), Colors::Uniform(other)) => one == other,
-        (one, other) => discriminant(one) == discriminant(other),
-    };
-    if meshes.windows(2).all(alike) {
-        return;
-    }
-    let more = |mesh: &Mesh| match &mesh.colors {
-        Colors::PerMaterial { materials, .. } => materials.iter().any(is_more_than_a_color),
-        _ => false,
-    };
-    let by_vertex =
-        meshes.iter().any(|mesh| matches!(mesh.colors, Colors::PerVertex(_))) && !meshes.iter().any(more);
-    for mesh in meshes {
-        if by_vertex {
-            to_vertices(mesh);
-        } else {
-            to_materials(mesh);
+/// A kind of colours, and what of them has a part in what they become.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind<'a> {
+    Uniform(Vec3),
+    PerTriangle,
+    PerVertex,
+    PerMaterial(&'a [Material]),
+}
+
+impl<'a> Kind<'a> {
+    fn of(colors: &'a Colors) -> Self {
+        match colors {
+            Colors::Uniform(color) => Self::Uniform(*color),
+            Colors::PerTriangle(_) => Self::PerTriangle,
+            Colors::PerVertex(_) => Self::PerVertex,
+            Colors::PerMaterial { materials, .. } => Self::PerMaterial(materials),
         }
     }
+}
+
+/// What colours of several meshes become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Common {
+    /// What they are: they are of one kind.
+    Same,
+    Vertices,
+    Materials,
+}
+
+impl Common {
+    /// What colours of these kinds become.
+    pub fn of(kinds: &[Kind<'_>]) -> Self {
+        let alike = |pair: &[Kind<'_>]| match (&pair[0], &pair[1]) {
+            (Kind::Uniform(one), Kind::Uniform(other)) => one == other,
+            (one, other) => discriminant(one) == discriminant(other),
+        };
+        let more = |kind: &Kind<'_>| match kind {
+            Kind::PerMaterial(materials) => materials.iter().any(is_more_than_a_color),
+            _ => false,
+        };
+        if kinds.windows(2).all(alike) {
+            Self::Same
+        } else if kinds.iter().any(|kind| matches!(kind, Kind::PerVertex)) && !kinds.iter().any(more) {
+            Self::Vertices
+        } else {
+            Self::Materials
+        }
+    }
+}
+
+/// Gives all meshes colours of one kind.
+fn unify(meshes: &mut [Mesh]) {
+    let kinds: Vec<_> = meshes.iter().map(|mesh| Kind::of(&mesh.colors)).collect();
+    let common = Common::of(&kinds);
+    let change: fn(&mut Mesh) = match common {
+        Common::Same => return,
+        Common::Vertices => to_vertices,
+        Common::Materials => to_materials,
+    };
+    meshes.iter_mut().for_each(change);
 }
 
 /// Whether a matt surface of its diffuse colour would look different.
@@ -124,22 +176,37 @@ fn to_materials(mesh: &mut Mesh) {
 
 /// A material for each of the triangles' colours, named after it, and which of them each has.
 fn by_color(colors: impl Iterator<Item = [u8; 3]>) -> (Vec<Material>, Vec<u32>) {
-    let mut numbers = HashMap::new();
-    let mut materials = Vec::new();
-    let number = |color: [u8; 3]| {
-        *numbers.entry(color).or_insert_with(|| {
+    let mut by_color = ByColor::default();
+    let of_triangle = colors.map(|color| by_color.number(color)).collect();
+    (by_color.materials, of_triangle)
+}
+
+/// A material for each of some colours, in the order in which they were met.
+#[derive(Default)]
+pub(super) struct ByColor {
+    numbers: HashMap<[u8; 3], u32>,
+    pub materials: Vec<Material>,
+}
+
+impl ByColor {
+    /// Which of them a colour's is, which is named after it.
+    pub fn number(&mut self, color: [u8; 3]) -> u32 {
+        *self.numbers.entry(color).or_insert_with(|| {
             let [r, g, b] = color;
-            materials.push(Material::matt(format!("#{r:02x}{g:02x}{b:02x}"), decode(color)));
-            materials.len() as u32 - 1
+            self.materials.push(Material::matt(format!("#{r:02x}{g:02x}{b:02x}"), decode(color)));
+            self.materials.len() as u32 - 1
         })
-    };
-    let of_triangle = colors.map(number).collect();
-    (materials, of_triangle)
+    }
 }
 
 /// The colour between those of three vertices, in 32 steps a channel.
 fn average(corners: &[u32; 3], colors: &[[u8; 3]]) -> [u8; 3] {
-    let sum: Vec3 = corners.iter().map(|&vertex| decode(colors[vertex as usize])).sum();
+    average_of(corners.map(|vertex| colors[vertex as usize]))
+}
+
+/// The colour between three, in 32 steps a channel.
+pub(super) fn average_of(colors: [[u8; 3]; 3]) -> [u8; 3] {
+    let sum: Vec3 = colors.iter().map(|&color| decode(color)).sum();
     encode(sum / 3.0).map(|byte| ((u32::from(byte) * 31 + 127) / 255 * 255 / 31) as u8)
 }
 

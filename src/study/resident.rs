@@ -1,6 +1,10 @@
 //! How much memory the process occupies, as the system sees it.
 
 use std::fs;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The most bytes that were resident before a measurement had the system forget them.
+static FORGOTTEN: AtomicU64 = AtomicU64::new(0);
 
 /// A measurement of how far the resident memory rises. On Linux; elsewhere there is none.
 ///
@@ -14,6 +18,7 @@ pub struct Resident {
 impl Resident {
     /// Starts to measure; `None` if the system does not say, or does not let the peak be forgotten.
     pub fn start() -> Option<Self> {
+        FORGOTTEN.fetch_max(status("VmHWM:")?, Ordering::Relaxed);
         // "5" sets the peak back to what is resident now (proc(5)).
         fs::write("/proc/self/clear_refs", "5").ok()?;
         Some(Self { before: status("VmRSS:")? })
@@ -30,9 +35,9 @@ pub fn now() -> Option<u64> {
     status("VmRSS:")
 }
 
-/// The most bytes that were resident so far, or since a [`Resident`] was started.
+/// The most bytes that the process ever had resident so far; `None` if the system does not say.
 pub fn peak() -> Option<u64> {
-    status("VmHWM:")
+    status("VmHWM:").map(|peak| peak.max(FORGOTTEN.load(Ordering::Relaxed)))
 }
 
 /// A line of the process's status, in bytes.
@@ -52,5 +57,15 @@ mod tests {
         let array = std::hint::black_box(vec![1u8; 64 << 20]);
         let rise = resident.rise().expect("the system says");
         assert!(rise >= 48 << 20 && array.len() == 64 << 20, "{rise}");
+    }
+
+    #[test]
+    fn a_peak_outlasts_measurements_after_it() {
+        let array = std::hint::black_box(vec![1u8; 64 << 20]);
+        let Some(before) = peak() else { return };
+        assert!(before >= array.len() as u64);
+        drop(array);
+        let _ = Resident::start();
+        assert!(peak() >= Some(before));
     }
 }

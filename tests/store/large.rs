@@ -209,6 +209,52 @@ fn obj_models_larger_than_the_memory_given_are_built_piece_by_piece() {
     assert_eq!(place.files(), ["again.rpk", "hills.mtl", "hills.obj", "parts.rpk", "whole.rpk"]);
 }
 
+/// Builds models in memory and piece by piece, within so many MiB, and sees to it that both give the same.
+fn same_of_several(place: &Place, models: &[&str], mebibytes: u64) {
+    let models = models.join(" ");
+    let whole = report(place, &format!("build {models} -o whole.rpk"));
+    let built = built_within(place, &format!("build {models} -o parts.rpk"), mebibytes);
+    place.succeed("info parts.rpk --verify");
+    same_sections(place, "whole.rpk", "parts.rpk");
+    let read = |report: &Value| {
+        let mut models = report["models"].clone();
+        for model in models.as_array_mut().expect("a list") {
+            model.as_object_mut().expect("a model").remove("read_seconds");
+        }
+        (models, report["triangles"].clone(), report["vertices"].clone())
+    };
+    assert_eq!((read(&whole), &whole["tree"]), (read(&built), &built["tree"]));
+    let [one, other] = ["whole.rpk", "parts.rpk"].map(|file| report(place, &format!("info {file}")));
+    assert_eq!((&one["colors"], &one["file"]["source"]), (&other["colors"], &other["file"]["source"]));
+}
+
+/// A PLY of a few triangles by vertex colour, one of which has no area.
+const COLORED: &str = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+                       property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 3\n\
+                       property list uchar int vertex_indices\nend_header\n0 90 0 255 0 0\n9 90 0 0 255 0\n\
+                       0 90 9 0 0 255\n18 90 0 9 9 9\n0 99 0 200 100 50\n3 0 1 2\n3 0 1 3\n3 0 2 4\n";
+
+#[test]
+fn several_models_larger_than_the_memory_given_are_built_piece_by_piece() {
+    let place = Place::new();
+    hills(&place, 260);
+    solid_hills(&place, 260);
+    twin_hills(&place, 180);
+    place.write("few.ply", COLORED);
+    // Materials, texture coordinates, normals and pictures beside models that have colours, or nothing.
+    same_of_several(&place, &["few.ply", "hills.obj", "hills.stl", "hills.glb", "few.ply"], 120);
+    // One of them a scene file; and colours by vertex, which all become.
+    place.succeed("build hills.stl few.ply -o some.rpk");
+    same_of_several(&place, &["some.rpk", "hills.stl", "hills.stl"], 120);
+    same_of_several(&place, &["hills.obj", "some.rpk"], 120);
+    let files =
+        ["few.ply", "hills.glb", "hills.mtl", "hills.obj", "hills.stl", "parts.rpk", "some.rpk", "whole.rpk"];
+    assert_eq!(place.files(), files);
+    // Refused before anything is read: what is no OBJ further on is not noticed.
+    let refused = ["--memory: building ", "triangles piece by piece takes", "MiB: give "];
+    place.fail("build hills.stl hills.glb -o parts.rpk --memory 60MiB", &refused);
+}
+
 #[test]
 fn stl_models_larger_than_the_memory_given_are_built_piece_by_piece() {
     let place = Place::new();

@@ -1,14 +1,15 @@
-//! A scene file of a model that is larger than the memory given.
+//! A scene file of models that are larger than the memory given.
 
 use super::super::options::BuildOptions;
 use super::super::progress::{Bar, watch};
 use super::super::report::{bytes, duration};
 use super::super::scene::BuildMemory;
-use super::{Args, ModelReport};
+use super::{Args, ModelReport, names};
 use crate::error::{Error, Result};
 use crate::files::folder_of;
 use crate::kdtree::{BuildParams, TreeStats};
-use crate::mesh::spooled::{self, SpooledMesh};
+use crate::mesh::ReadReport;
+use crate::mesh::spooled::{self, Announced, SpooledMesh};
 use crate::stage::Stage;
 use crate::store::large::{self, Built, Progress};
 use crate::store::{self, Written, is_scene};
@@ -22,7 +23,9 @@ const PROCESS: usize = 32 << 20;
 
 /// What was built.
 pub struct Large {
-    pub model: ModelReport,
+    pub models: Vec<ModelReport>,
+    pub triangles: usize,
+    pub vertices: usize,
     pub tree: TreeStats,
     pub seconds: f64,
     pub memory: BuildMemory,
@@ -30,30 +33,93 @@ pub struct Large {
     pub written: Written,
 }
 
-/// Whether a model is to be built piece by piece: it is one that can be, and with its tree it is larger than
-/// the memory given.
+/// Whether models are to be built piece by piece: they can be, and all of them with their tree are larger than the memory
+/// given.
+///
+/// # Errors
+/// They are, and the memory given is too little for that, too; nothing has been read then.
 pub fn is_called_for(
     models: &[impl AsRef<Path>],
     options: &BuildOptions,
     params: &BuildParams,
 ) -> Result<bool> {
-    let (Some(limit), [model]) = (options.limit()?, models) else { return Ok(false) };
-    let model = model.as_ref();
-    let announced =
-        if is_scene(model) { Some(store::File::open(model)?.announced()) } else { spooled::announced(model) };
-    let Some(announced) = announced else { return Ok(false) };
-    let (mesh, tree) = (announced.mesh_bytes() as usize, params.peak_bytes(announced.triangles as usize));
+    let Some(limit) = options.limit()? else { return Ok(false) };
+    let mut all = Announced::default();
+    for model in models {
+        let model = model.as_ref();
+        let announced = if is_scene(model) {
+            Some(store::File::open(model)?.announced())
+        } else {
+            spooled::announced(model)
+        };
+        let Some(announced) = announced else { return Ok(false) };
+        all = all.and(announced);
+    }
+    let (mesh, tree) = (all.mesh_bytes() as usize, params.peak_bytes(all.triangles as usize));
     let in_memory = mesh.saturating_add(tree).saturating_add(PROCESS);
+    if in_memory > limit {
+        check_limit(params, all.triangles as usize, limit)?;
+    }
     Ok(in_memory > limit)
 }
 
-/// Reads the model, builds its tree and writes the scene file within the memory given.
+/// Whether a tree of so many triangles can be built piece by piece within the memory given.
+///
+/// # Errors
+/// It cannot: how much it takes.
+fn check_limit(params: &BuildParams, triangles: usize, limit: usize) -> Result<()> {
+    let least = large::least_bytes(params, triangles) + PROCESS;
+    if least > limit {
+        let message = format!(
+            "building {triangles} triangles piece by piece takes {}: give {}MiB",
+            bytes(least as u64),
+            least.div_ceil(1 << 20)
+        );
+        return Err(Error::option("--memory", message));
+    }
+    Ok(())
+}
+
+/// Reads the models, builds their tree and writes the scene file within the memory given.
 pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
-    let path = &args.models[0];
-    let name = path.display().to_string();
     let folder = folder_of(&args.output);
+    let (mut meshes, mut models) = (Vec::new(), Vec::new());
+    for path in &args.models {
+        let (mesh, mut model) = read(path, folder)?;
+        if args.models.len() > 1
+            && let Some(report) = &mut model.read_report
+        {
+            report.zero_area_triangles = zero_area(&mesh, folder)?;
+        }
+        meshes.push(mesh);
+        models.push(model);
+    }
+    let mesh = match <[SpooledMesh; 1]>::try_from(meshes) {
+        Ok([mesh]) => mesh,
+        Err(several) => SpooledMesh::join(several, folder)?,
+    };
+    let (triangles, vertices) = (mesh.triangles.len(), mesh.positions.len());
+    let (built, seconds, memory) = build_mesh(&args.output, &mesh, params, limit, &names(&models))?;
+    if let [ModelReport { read_report: Some(report), .. }] = &mut models[..] {
+        // Of one model, it has been counted on the way.
+        report.zero_area_triangles = built.zero_area_triangles;
+    }
+    Ok(Large {
+        models,
+        triangles,
+        vertices,
+        tree: built.stats,
+        seconds,
+        memory,
+        parts: built.parts,
+        written: built.written,
+    })
+}
+
+/// Reads a model to files in `folder`.
+fn read(path: &Path, folder: &Path) -> Result<(SpooledMesh, ModelReport)> {
     let start = Instant::now();
-    let (mesh, mut read_report) = if is_scene(path) {
+    let (mesh, read_report): (_, Option<ReadReport>) = if is_scene(path) {
         (store::File::open(path)?.spooled_mesh(folder)?, None)
     } else {
         Stage::Reading.begin();
@@ -62,21 +128,15 @@ pub fn build(args: &Args, params: &BuildParams, limit: usize) -> Result<Large> {
         (mesh, Some(report))
     };
     let read_seconds = start.elapsed().as_secs_f64();
-    info!("read {name} in {}, to files", duration(read_seconds));
-
+    let model = path.display().to_string();
+    info!("read {model} in {}, to files", duration(read_seconds));
     let (triangles, vertices) = (mesh.triangles.len(), mesh.positions.len());
-    let (built, seconds, memory) = build_mesh(&args.output, &mesh, params, limit, &name)?;
-    if let Some(report) = &mut read_report {
-        report.zero_area_triangles = built.zero_area_triangles;
-    }
-    Ok(Large {
-        model: ModelReport { model: name, triangles, vertices, read_seconds, read_report },
-        tree: built.stats,
-        seconds,
-        memory,
-        parts: built.parts,
-        written: built.written,
-    })
+    Ok((mesh, ModelReport { model, triangles, vertices, read_seconds, read_report }))
+}
+
+/// How many triangles of a mesh in files in `folder` have no area.
+fn zero_area(mesh: &SpooledMesh, folder: &Path) -> Result<u64> {
+    mesh.zero_area_triangles().map_err(|source| Error::Read { path: folder.into(), source })
 }
 
 /// Builds the tree of a mesh in files and writes the scene file within the memory given; the seconds of that, and
@@ -88,16 +148,7 @@ pub fn build_mesh(
     limit: usize,
     source: &str,
 ) -> Result<(Built, f64, BuildMemory)> {
-    let triangles = mesh.triangles.len();
-    let least = large::least_bytes(params, triangles) + PROCESS;
-    if least > limit {
-        let message = format!(
-            "building {triangles} triangles piece by piece takes {}: give {}MiB",
-            bytes(least as u64),
-            least.div_ceil(1 << 20)
-        );
-        return Err(Error::option("--memory", message));
-    }
+    check_limit(params, mesh.triangles.len(), limit)?;
     let start = Instant::now();
     let progress = Progress::default();
     let work = || large::build(output, mesh, params, limit - PROCESS, source, &progress);

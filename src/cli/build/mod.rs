@@ -23,7 +23,7 @@ use std::time::Instant;
 /// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
 /// become one scene. Primitive ids run on from model to model in the order in which they are named.
 ///
-/// With --memory, a model that is larger than that, with its tree, is read and built piece by piece: the same scene, in
+/// With --memory, models that are larger than that, with their tree, are read and built piece by piece: the same scene, in
 /// more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Args {
@@ -87,9 +87,9 @@ pub fn run(args: &Args) -> Result<()> {
         let large = large::build(args, &profile.build, limit)?;
         let report = Report {
             engine: ENGINE,
-            triangles: large.model.triangles,
-            vertices: large.model.vertices as u64,
-            models: &[large.model],
+            triangles: large.triangles,
+            vertices: large.vertices as u64,
+            models: &large.models,
             build_seconds: large.seconds,
             build_memory: large.memory,
             parts: Some(large.parts),
@@ -148,10 +148,15 @@ fn read(paths: &[PathBuf]) -> Result<(Model, Vec<ModelReport>)> {
         });
         meshes.push(model.mesh);
     }
-    let names: Vec<&str> = reports.iter().map(|report| &*report.model).collect();
     let seconds = reports.iter().map(|report| report.read_seconds).sum();
-    let model = Model { name: names.join(", "), mesh: Mesh::join(meshes)?, report: None, seconds };
+    let model = Model { name: names(&reports), mesh: Mesh::join(meshes)?, report: None, seconds };
     Ok((model, reports))
+}
+
+/// What several models are called together.
+fn names(models: &[ModelReport]) -> String {
+    let names: Vec<&str> = models.iter().map(|model| &*model.model).collect();
+    names.join(", ")
 }
 
 impl Args {

@@ -1,5 +1,7 @@
 //! `raypack render --heatmap`: a picture of what pixels cost.
 
+use crate::cli::memory::MemoryReport;
+use crate::cli::options::BuildOptions;
 use crate::cli::progress::watch;
 use crate::cli::report::{ENGINE, Engine, Json, Lines};
 use crate::cli::scene::{Scene, SceneReport};
@@ -51,6 +53,7 @@ struct Report<'a> {
     size: Size,
     heatmap: Shown,
     spread: Spread,
+    memory: MemoryReport,
 }
 
 /// Measures what all pixels cost.
@@ -75,7 +78,7 @@ pub fn give(
     heatmap: Shown,
     costs: &[f32],
     file: &Path,
-    json: &Json,
+    (build, json): (&BuildOptions, &Json),
 ) -> Result<()> {
     let spread = Spread::of(costs);
     let brightest = spread.percentile_99.max(f32::MIN_POSITIVE);
@@ -84,7 +87,9 @@ pub fn give(
         [color.0, color.1, color.2]
     })?;
 
-    let report = Report { engine: ENGINE, scene: scene.report(), file, camera, size, heatmap, spread };
+    let (memory, _) = scene.memory_report(build)?;
+    let report =
+        Report { engine: ENGINE, scene: scene.report(), file, camera, size, heatmap, spread, memory };
     let mut lines = Lines::default();
     scene.describe(&mut lines);
     lines.add("camera", camera.to_string());
@@ -106,5 +111,6 @@ pub fn give(
         "picture",
         format!("{}: from 0, dark, to {percentile_99:.0}{unit} and more, bright", file.display()),
     );
+    memory.describe(&mut lines, "");
     json.give(lines.text(), &report)
 }

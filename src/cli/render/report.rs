@@ -1,7 +1,8 @@
 //! What `render` reports: the scene, the machine's part, and what each frame cost.
 
-use crate::cli::cache_options::CacheReport;
+use crate::cli::cache_options::{CacheReport, describe_memory};
 use crate::cli::looks::callers;
+use crate::cli::memory::MemoryReport;
 use crate::cli::report::{ENGINE, Engine, Lines, counted, duration, grouped};
 use crate::cli::scene::{Scene, SceneReport};
 use crate::geometry::Accuracy;
@@ -66,6 +67,8 @@ pub struct Report<'a> {
     /// Seconds of shading beside them, if the plain renderer did not do.
     #[serde(skip_serializing_if = "Option::is_none")]
     shading_seconds: Option<f64>,
+    /// The memory that was given, and the most that was taken.
+    memory: MemoryReport,
     /// Of a scene that is not all in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     cache: Option<CacheReport>,
@@ -79,7 +82,7 @@ impl<'a> Report<'a> {
         settings: &RenderSettings,
         profile: &'a str,
         frames: Vec<Shot>,
-        cache: Option<CacheReport>,
+        (memory, cache): (MemoryReport, Option<CacheReport>),
         effects: &'a [Call],
     ) -> Self {
         let sum = |kind: fn(&FrameStats) -> RayCount| {
@@ -111,6 +114,7 @@ impl<'a> Report<'a> {
             effects,
             shading_seconds,
             costs,
+            memory,
             cache,
             frames,
         }
@@ -155,9 +159,6 @@ impl<'a> Report<'a> {
             }
         }
         self.describe_effects(&mut lines);
-        if let Some(cache) = &self.cache {
-            cache.describe(&mut lines);
-        }
         lines.add("total", format!("{}, shading included", rays(&self.total)));
         if let Some(words) = firsts(&self.frames) {
             lines.add("first", words);
@@ -167,7 +168,9 @@ impl<'a> Report<'a> {
             [still] => writeln!(text, "{:<10} {}", "wrote", still.file.display()).expect("into a string"),
             path => text.push_str(&frame_table(path)),
         }
-        text
+        let mut end = Lines::default();
+        describe_memory(&mut end, &self.memory, self.cache.as_ref());
+        text + end.text()
     }
 }
 

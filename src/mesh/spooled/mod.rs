@@ -6,6 +6,7 @@
 
 mod behind;
 mod check;
+mod join;
 mod whole;
 
 use super::lists::InFiles;
@@ -128,6 +129,15 @@ pub struct Announced {
 }
 
 impl Announced {
+    /// Both models together.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices.saturating_add(other.vertices),
+            triangles: self.triangles.saturating_add(other.triangles),
+            attributes: self.attributes || other.attributes,
+        }
+    }
+
     /// About how many bytes its mesh takes in memory.
     pub fn mesh_bytes(&self) -> u64 {
         /// An index of a material, or a colour.

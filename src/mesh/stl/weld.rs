@@ -20,7 +20,10 @@ use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::ops::Range;
 
-/// A corner: the bits of its place, and its number among all.
+/// What tells vertices apart: the bits of a corner's place, or anything else of that size.
+pub(in crate::mesh) type Key = [u32; 3];
+
+/// A corner: its key, and its number among all.
 type Record = [u32; 4];
 
 /// Records that are written and read at once.
@@ -73,11 +76,15 @@ impl Weld {
         })
     }
 
-    /// Adds a triangle.
+    /// Adds a triangle, whose corners are told apart by their places.
     pub fn add(&mut self, corners: [Vec3; 3]) {
+        self.add_keys(corners.map(|corner| corner.to_array().map(f32::to_bits)));
+    }
+
+    /// Adds a triangle with corners of these keys.
+    pub fn add_keys(&mut self, corners: [Key; 3]) {
         let mut number = 3 * self.parts_of.len() as u32;
-        self.parts_of.push(corners.map(|corner| {
-            let [x, y, z] = corner.to_array().map(f32::to_bits);
+        self.parts_of.push(corners.map(|[x, y, z]| {
             let place = (self.hasher.hash_one([x, y, z]) % self.parts.len() as u64) as usize;
             let part = &mut self.parts[place];
             part.waiting.push([x, y, z, number]);
@@ -101,33 +108,47 @@ impl Weld {
         lists: &InFiles,
         progress: &dyn Fn(f32),
     ) -> io::Result<(Spooled<Vec3>, Spooled<[u32; 3]>)> {
+        let (keys, triangles) = self.finish_keys(lists, progress)?;
+        // A place is its bits.
+        Ok((Spooled::in_file(keys.file(), 0, keys.len()), triangles))
+    }
+
+    /// The vertices' keys, likewise, and the triangles.
+    ///
+    /// # Errors
+    /// Something cannot be written, or read.
+    pub fn finish_keys(
+        self,
+        lists: &InFiles,
+        progress: &dyn Fn(f32),
+    ) -> io::Result<(Spooled<Key>, Spooled<[u32; 3]>)> {
         let (pieces, parts_of) = (self.pieces.finish()?, self.parts_of.finish()?);
         let mut is_first = Bits::new(3 * parts_of.len());
-        let mut found = Found { firsts: lists.list()?, places: lists.list()? };
+        let mut found = Found { firsts: lists.list()?, keys: lists.list()? };
         let mut ranges = Vec::with_capacity(self.parts.len());
         let mut table = HashMap::new();
         for (done, part) in self.parts.iter().enumerate() {
             progress(0.5 * done as f32 / self.parts.len() as f32);
-            let (first, place) = (found.firsts.len(), found.places.len());
+            let (first, key) = (found.firsts.len(), found.keys.len());
             part.find(&pieces, &mut table, &mut is_first, &mut found)?;
-            ranges.push((first..found.firsts.len(), place..found.places.len()));
+            ranges.push((first..found.firsts.len(), key..found.keys.len()));
         }
         drop((pieces, table, self.parts));
 
-        let (firsts, places) = (found.firsts.finish()?, found.places.finish()?);
-        let ahead = |(first, place)| (Ahead::new(&firsts, first), Ahead::new(&places, place));
+        let (firsts, keys) = (found.firsts.finish()?, found.keys.finish()?);
+        let ahead = |(first, key)| (Ahead::new(&firsts, first), Ahead::new(&keys, key));
         let mut of_parts: Vec<_> = ranges.into_iter().map(ahead).collect();
         let numbers = is_first.numbers();
-        let (mut positions, mut triangles) = (lists.list()?, lists.list()?);
+        let (mut vertices, mut triangles) = (lists.list()?, lists.list()?);
         parts_of.each(|done, some| {
             progress(0.5 + 0.5 * done as f32 / parts_of.len() as f32);
             for (triangle, parts) in (done..).zip(some) {
                 let mut corners = [0; 3];
                 for (i, &part) in parts.iter().enumerate() {
-                    let (firsts, places) = &mut of_parts[usize::from(part)];
+                    let (firsts, keys) = &mut of_parts[usize::from(part)];
                     let first = firsts.next()?;
                     if first as usize == 3 * triangle + i {
-                        positions.push(places.next()?);
+                        vertices.push(keys.next()?);
                     }
                     corners[i] = numbers.of(first as usize);
                 }
@@ -135,24 +156,24 @@ impl Weld {
             }
             Ok::<(), io::Error>(())
         })?;
-        Ok((positions.finish()?, triangles.finish()?))
+        Ok((vertices.finish()?, triangles.finish()?))
     }
 }
 
 /// What was found of the parts, one after the other.
 struct Found {
-    /// For each corner, the first that is at the same place.
+    /// For each corner, the first that has the same key.
     firsts: Spool<u32>,
-    /// The places of those that are the first.
-    places: Spool<Vec3>,
+    /// The keys of those that are the first.
+    keys: Spool<Key>,
 }
 
 impl Part {
-    /// Finds the first corner at each one's place. `table` is for that; what is in it does not count.
+    /// Finds the first corner with each one's key. `table` is for that; what is in it does not count.
     fn find(
         &self,
         pieces: &Spooled<Record>,
-        table: &mut HashMap<[u32; 3], u32>,
+        table: &mut HashMap<Key, u32>,
         is_first: &mut Bits,
         found: &mut Found,
     ) -> io::Result<()> {
@@ -161,7 +182,7 @@ impl Part {
             for &[x, y, z, corner] in records {
                 let first = *table.entry([x, y, z]).or_insert_with(|| {
                     is_first.set(corner as usize);
-                    found.places.push(Vec3::from_array([x, y, z].map(f32::from_bits)));
+                    found.keys.push([x, y, z]);
                     corner
                 });
                 found.firsts.push(first);
