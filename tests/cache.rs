@@ -51,6 +51,90 @@ fn pictures_are_the_same_within_the_memory_given() {
 }
 
 #[test]
+fn every_render_and_cast_ends_with_the_memory_given_and_taken() {
+    let place = place(20_000);
+    let ends = |text: &str| text.lines().last().expect("lines").to_owned();
+    for scene in ["plant.ply", "plant.rpk", ""] {
+        for what in ["", "--orbit 2", "--heatmap steps"] {
+            let options = format!("-o out.png --size 32x24 {what} --json out.json");
+            let last = ends(&place.succeed(&format!("render {scene} {options}")));
+            assert!(last.starts_with("memory ") && last.ends_with(" at most; no budget was given"), "{last}");
+            let memory = place.json("out.json")["memory"].clone();
+            assert!(memory["budget"].is_null() && memory["announced"].is_null(), "{memory}");
+            assert!(
+                !cfg!(target_os = "linux") || memory["peak_resident"].as_u64() > Some(1 << 20),
+                "{memory}"
+            );
+        }
+    }
+    let text = place.succeed("render plant.ply -o out.png --size 32x24 --memory 1GiB --json out.json");
+    let last = ends(&text);
+    assert!(last.starts_with("memory ") && last.contains(" of 1.00 GiB at most, "), "{last}");
+    let memory = place.json("out.json")["memory"].clone();
+    assert_eq!(memory["budget"], 1 << 30);
+    assert!(memory["announced"].as_u64() > Some(1 << 20), "{memory}");
+}
+
+#[test]
+fn a_model_within_memory_is_covered_with_its_picture_and_all_else() {
+    let place = Place::new();
+    place.succeed("generate plant --triangles 60000 --seed 5 -o plant.ply");
+    let render = |size: &str, memory: &str| {
+        format!("render plant.ply -o out.png --size {size} --threads 2 --memory {memory} --json out.json")
+    };
+    let least = |size: &str| {
+        let refused = place.raypack(&render(size, "1MiB")).assert().code(1).get_output().clone();
+        let message = String::from_utf8(refused.stderr).expect("text");
+        let given = message.split("give ").nth(1).and_then(|rest| rest.split("MiB").next());
+        given.and_then(|number| number.parse::<u64>().ok()).unwrap_or_else(|| panic!("{message}"))
+    };
+    // The picture counts: 4 million pixels more, of 28 bytes.
+    let [small, large] = ["64x64", "2000x2000"].map(least);
+    assert!((large - small).abs_diff(107) < 12, "{small} and {large}");
+    // Before a model is read, what its vertices take that nothing uses counts as well; and some of the least may go on.
+    for (size, memory) in [("64x64", small + 2), ("2000x2000", large + 2)] {
+        let text = place.succeed(&render(size, &format!("{memory}MiB")));
+        let report = place.json("out.json")["memory"].clone();
+        let number = |key: &str| report[key].as_u64().unwrap_or_else(|| panic!("{key} in {report}"));
+        assert_eq!(number("budget"), memory << 20);
+        assert!(number("announced") <= memory << 20, "{report}");
+        assert!(!cfg!(target_os = "linux") || number("peak_resident") <= memory << 20, "{report}");
+        assert!(text.lines().last().expect("lines").starts_with("memory "), "{text}");
+    }
+    place.fail(&render("64x64", "8MiB"), &["--memory: the process, the model", "MiB, or make a .rpk"]);
+}
+
+#[test]
+fn two_caches_are_told_apart() {
+    let place = place(400_000);
+    let options = format!("{VIEW} --memory 48MiB --json part.json");
+    let text = place.succeed(&format!("render plant.rpk -o part.png {options} --nodes 0.3:fifo"));
+    let cache = place.json("part.json")["cache"].clone();
+    let caches = cache["caches"].as_array().expect("two");
+    let number =
+        |of: &serde_json::Value, key: &str| of[key].as_u64().unwrap_or_else(|| panic!("{key} in {of}"));
+    let [nodes, leaves] = &caches[..] else { panic!("{cache}") };
+    assert_eq!([&nodes["of"], &leaves["of"]], ["nodes", "leaves"]);
+    assert_eq!(nodes["policy"], "fifo");
+    for key in ["uses", "misses", "loads", "bytes_read", "evictions"] {
+        assert_eq!(number(nodes, key) + number(leaves, key), number(&cache, key), "{key} in {cache}");
+    }
+    for one in [nodes, leaves] {
+        assert!(number(one, "loads") > 0 && number(one, "uses") > number(one, "misses"), "{one}");
+        let (uses, misses) = (number(one, "uses") as f64, number(one, "misses") as f64);
+        assert!((one["hit_ratio"].as_f64().expect("a share") - (1.0 - misses / uses)).abs() < 1e-9, "{one}");
+    }
+    let share = number(nodes, "bytes") as f64 / (number(nodes, "bytes") + number(leaves, "bytes")) as f64;
+    assert!((0.27..0.33).contains(&share), "{cache}");
+    for of in ["nodes: fifo in ", "leaves: "] {
+        let line = text.lines().find(|line| line.contains(of)).unwrap_or_else(|| panic!("{of} in {text}"));
+        assert!(line.contains("% of uses hit, ") && line.contains(" read"), "{line}");
+    }
+    place.succeed(&format!("render plant.rpk -o part.png {options}"));
+    assert!(place.json("part.json")["cache"]["caches"].is_null());
+}
+
+#[test]
 fn several_processes_share_a_scene_file() {
     let place = place(400_000);
     place.succeed(&format!("render plant.rpk -o whole.png {VIEW}"));

@@ -78,7 +78,7 @@ impl CacheArgs {
 }
 
 /// Memory of a thread that traces: the touched part of its stack, and what it has in work.
-const BYTES_PER_WORKER: usize = 256 << 10;
+pub const BYTES_PER_WORKER: usize = 256 << 10;
 
 /// What a scene of which a part is in memory is opened for.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! `raypack cast SCENE --rays rays.npy -o hits.npz`: a batch of queries from NumPy and back.
 
-use super::cache_options::{CacheArgs, CacheReport, Within, describe_memory};
-use super::memory::MemoryReport;
+use super::cache_options::{BYTES_PER_WORKER, CacheArgs, CacheReport, Within, describe_memory};
+use super::memory::{Beside, MemoryReport};
 use super::options::{AccuracyOption, BuildOptions, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
@@ -140,7 +140,12 @@ pub fn run(args: &Args) -> Result<()> {
     let rays_read_seconds = start.elapsed().as_secs_f64() - opened_seconds;
     let mut scene = match part {
         Some(scene) => scene,
-        None => Scene::prepare(&args.scene, &args.build, &profile.build, isa)?,
+        None => {
+            // The rays are there.
+            let fixed = args.bytes_of(rays.len(), 0) + threads * BYTES_PER_WORKER;
+            let beside = Beside { fixed, accuracy, of_mesh: &|_| 0 };
+            Scene::prepare_beside(&args.scene, &args.build, &profile.build, isa, &beside)?
+        }
     };
     scene.accel.set_accuracy(accuracy);
 
@@ -187,10 +192,14 @@ impl Args {
 
     /// The scene file, of which a part will be in memory, for so many rays.
     fn open_within(&self, rays: usize, within: Within) -> Result<Scene> {
-        let answer = if self.any { size_of::<bool>() } else { size_of::<Hit>() };
-        let each = size_of::<Ray>() + answer;
-        let beside = rays.saturating_mul(each).saturating_add(Batch::bytes_beside(rays) + FILES);
+        let beside = self.bytes_of(rays, size_of::<Ray>());
         self.cache.open(&self.scene, within, |_, _| beside)
+    }
+
+    /// Memory of the answers of so many rays, and of these, if each takes `ray` bytes.
+    fn bytes_of(&self, rays: usize, ray: usize) -> usize {
+        let answer = if self.any { size_of::<bool>() } else { size_of::<Hit>() };
+        rays.saturating_mul(ray + answer).saturating_add(Batch::bytes_beside(rays) + FILES)
     }
 
     /// Finds out before any work whether the output can be written, and is not one of the other files.

@@ -1,5 +1,6 @@
 //! From a model's name to a mesh, and to a tree.
 
+use super::memory::Beside;
 use super::options::BuildOptions;
 use super::progress::{Bar, watch};
 use super::report::{bytes, duration};
@@ -63,6 +64,32 @@ impl Model {
     pub fn build(self, options: &BuildOptions, params: &BuildParams, isa: Isa) -> Result<Scene> {
         let mut params = params.clone();
         options.fit(&self.mesh, &mut params)?;
+        self.build_fitting(&params, isa)
+    }
+
+    /// The same, where the memory given is for everything that the process takes.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn build_beside(
+        self,
+        params: &BuildParams,
+        isa: Isa,
+        limit: usize,
+        beside: &Beside<'_>,
+    ) -> Result<Scene> {
+        let mut params = params.clone();
+        let announced = beside.fit(&self.mesh, &mut params, limit)?;
+        info!(
+            "all will take {} at most, with max_duplication {:.2}",
+            bytes(announced as u64),
+            params.max_duplication
+        );
+        Ok(Scene { announced: Some(announced), ..self.build_fitting(&params, isa)? })
+    }
+
+    /// The same, with parameters that fit.
+    fn build_fitting(self, params: &BuildParams, isa: Isa) -> Result<Scene> {
         let announced = params.peak_bytes(self.mesh.triangles.len());
         info!("the build will take {} at most", bytes(announced as u64));
         let resident = Resident::start();
@@ -72,7 +99,7 @@ impl Model {
         let accel = watch(
             "building",
             || progress.fraction(),
-            || Accel::build_with_progress(&self.mesh, &params, &progress),
+            || Accel::build_with_progress(&self.mesh, params, &progress),
         )?;
         let build_seconds = start.elapsed().as_secs_f64();
         info!("built the tree in {}", duration(build_seconds));
@@ -91,6 +118,7 @@ impl Model {
                 build_seconds,
                 build_memory,
             },
+            announced: None,
         })
     }
 }

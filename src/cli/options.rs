@@ -40,8 +40,8 @@ pub struct BuildOptions {
     /// third to a half of the time a tree for a first look, best takes 1.6 times as long for rays that are a little quicker
     #[arg(long, value_name = "preview|standard|best")]
     preset: Option<String>,
-    /// The memory that model and build may take, as 512MiB or 2GiB: the tree is made coarser to fit, and
-    /// where that does not do, it is refused before the build starts. Of a scene file, render and cast hold as
+    /// The memory that model and build may take, as 512MiB or 2GiB, and with render and cast all that the process
+    /// takes: the tree is made coarser to fit, and where that does not do, it is refused before the build starts. Of a scene file, render and cast hold as
     /// much as fits and read the rest when it is needed [default: no limit]
     #[arg(long, value_name = "SIZE")]
     memory: Option<String>,

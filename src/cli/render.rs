@@ -3,8 +3,9 @@
 mod heat;
 mod report;
 
-use super::cache_options::{CacheArgs, Within};
+use super::cache_options::{BYTES_PER_WORKER, CacheArgs, Within};
 use super::looks::LooksOptions;
+use super::memory::Beside;
 use super::model::Model;
 use super::options::{AccuracyOption, BuildOptions, as_option, orbit};
 use super::outputs::Outputs;
@@ -12,6 +13,7 @@ use super::progress::watch;
 use super::report::Json;
 use super::scene::{Looks, Scene};
 use crate::error::{Error, Result};
+use crate::mesh::Mesh;
 use crate::mesh::generate::plant;
 use crate::profile::Profile;
 use crate::render::{First, RenderSettings, Renderer, Size, Tuning, memory_beside};
@@ -134,8 +136,20 @@ pub fn run(args: &Args) -> Result<()> {
             let prefetch = args.prefetch.as_deref().map(str::parse).transpose()?;
             args.open_within(path, &settings, Within { memory, accuracy, threads, isa, prefetch })?
         }
-        (Some(path), _) => Scene::prepare(path, &args.build, &profile.build, isa)?,
-        (None, _) => Model::demo().build(&args.build, &profile.build, isa)?,
+        (path, limit) => {
+            let threads = settings.tuning.worker_count();
+            let request = args.looks.check()?;
+            let of_mesh = |mesh: &Mesh| {
+                memory_beside(mesh.colors.materials(), &mesh.colors.uses(), &mesh.images, &request, threads)
+            };
+            let fixed = settings.frame_bytes() + threads * BYTES_PER_WORKER;
+            let beside = Beside { fixed, accuracy, of_mesh: &of_mesh };
+            match (path, limit) {
+                (Some(path), _) => Scene::prepare_beside(path, &args.build, &profile.build, isa, &beside)?,
+                (None, Some(limit)) => Model::demo().build_beside(&profile.build, isa, limit, &beside)?,
+                (None, None) => Model::demo().build(&args.build, &profile.build, isa)?,
+            }
+        }
     };
     scene.accel.set_accuracy(accuracy);
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));

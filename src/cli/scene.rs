@@ -1,7 +1,7 @@
 //! What commands trace: a model and its tree, just built, or a scene file.
 
 use super::cache_options::{CacheReport, taken_so_far};
-use super::memory::MemoryReport;
+use super::memory::{Beside, MemoryReport};
 use super::model::Model;
 use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
@@ -33,6 +33,8 @@ pub struct Scene {
     pub looks: Looks,
     /// How it came here.
     pub origin: Origin,
+    /// The most bytes that the process takes with it, as far as that was asked for before its tree was built.
+    pub announced: Option<usize>,
 }
 
 /// What a scene's surfaces are read from.
@@ -128,6 +130,24 @@ impl Scene {
         }
     }
 
+    /// The same, where `--memory` is for everything that the process takes.
+    ///
+    /// # Errors
+    /// Likewise, or everything takes more.
+    pub fn prepare_beside(
+        path: &Path,
+        options: &BuildOptions,
+        params: &BuildParams,
+        isa: Isa,
+        beside: &Beside<'_>,
+    ) -> Result<Self> {
+        let Some(limit) = options.limit()?.filter(|_| !is_scene(path)) else {
+            return Self::prepare(path, options, params, isa);
+        };
+        beside.check(path, params, limit)?;
+        Model::read(path)?.build_beside(params, isa, limit, beside)
+    }
+
     /// The scene in a scene file.
     ///
     /// # Errors
@@ -182,6 +202,7 @@ impl Scene {
                 source: meta.source.clone(),
                 made_by: meta.engine.clone(),
             },
+            announced: None,
         }
     }
 
@@ -218,7 +239,7 @@ impl Scene {
     /// # Errors
     /// The memory given is no size.
     pub fn memory_report(&self, options: &BuildOptions) -> Result<(MemoryReport, Option<CacheReport>)> {
-        let memory = MemoryReport::new(options)?;
+        let memory = MemoryReport::new(options, self.announced)?;
         let cache = self.accel.cached().map(|cached| CacheReport::new(memory, cached));
         Ok((memory, cache))
     }

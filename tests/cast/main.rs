@@ -260,6 +260,9 @@ fn hits_are_the_same_within_the_memory_given() {
             assert!(number("peak_resident") <= BUDGET, "{any} {how}: {cache}");
         }
     }
+    let whole = place.succeed("cast plant.rpk --rays rays.npy -o whole.npz --json whole.json");
+    assert!(whole.lines().last().expect("lines").ends_with(" at most; no budget was given"), "{whole}");
+    assert!(place.json("whole.json")["memory"]["budget"].is_null());
     let text = place.succeed("cast plant.rpk --rays rays.npy -o part.npz --memory 52MiB");
     assert!(text.contains("of 52.0 MiB at most") && text.contains("% of uses hit"), "{text}");
 
