@@ -139,10 +139,12 @@ pub fn run(args: &Args) -> Result<()> {
         (path, limit) => {
             let threads = settings.tuning.worker_count();
             let request = args.looks.check()?;
+            let environment = args.looks.environment_bytes()?;
             let of_mesh = |mesh: &Mesh| {
-                memory_beside(mesh.colors.materials(), &mesh.colors.uses(), &mesh.images, &request, threads)
+                let (materials, uses) = (mesh.colors.materials(), mesh.colors.uses());
+                memory_beside(materials, &uses, &mesh.images, &request, environment.is_some(), threads)
             };
-            let fixed = settings.frame_bytes() + threads * BYTES_PER_WORKER;
+            let fixed = settings.frame_bytes() + threads * BYTES_PER_WORKER + environment.unwrap_or(0);
             let beside = Beside { fixed, accuracy, of_mesh: &of_mesh };
             match (path, limit) {
                 (Some(path), _) => Scene::prepare_beside(path, &args.build, &profile.build, isa, &beside)?,
