@@ -139,7 +139,8 @@ pub fn run(args: &Args) -> Result<()> {
         (path, limit) => {
             let threads = settings.tuning.worker_count();
             let request = args.looks.check()?;
-            let environment = args.looks.environment_bytes()?;
+            // Opened only where its size matters.
+            let environment = limit.map(|_| args.looks.environment_bytes()).transpose()?.flatten();
             let of_mesh = |mesh: &Mesh| {
                 let (materials, uses) = (mesh.colors.materials(), mesh.colors.uses());
                 memory_beside(materials, &uses, &mesh.images, &request, environment.is_some(), threads)
