@@ -66,6 +66,8 @@ mod tests {
         assert!(before >= array.len() as u64);
         drop(array);
         let _ = Resident::start();
-        assert!(peak() >= Some(before));
+        // The system counts pages by processor, and adds up now and then.
+        let (after, slack) = (peak().expect("the system said before"), 8 << 20);
+        assert!(after + slack >= before, "{after} after {before}");
     }
 }
