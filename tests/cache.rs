@@ -264,6 +264,20 @@ fn too_little_memory_and_nonsense_are_refused_beforehand() {
     );
     place.fail("cache plant.rpk --policies lru,best", &["--policies: \"best\" is none of"]);
     place.fail("cache plant.rpk --budgets 0", &["--budgets: 0 is not a share"]);
+    place.fail("cache plant.rpk --ways 8,0", &["--ways: 0 is not a number of blocks"]);
+    place.fail("cache plant.rpk --stripes 0,8", &["--stripes: 0 is not a number of locks"]);
+    place.fail("cache plant.rpk --block 512,5000", &["--block: 5000 is not a power of two"]);
+    place.fail("cache plant.rpk --nodes none,2", &["--nodes: 2 is not a share"]);
+    place.fail("cache plant.rpk --nodes 0.3:mru", &["--nodes: \"0.3:mru\" is not PART:POLICY"]);
+    place.fail("cache plant.rpk --beside rates.csv", &["rates.csv: unknown kind of file (.csv); rates come"]);
+    place.fail("cache plant.rpk --beside no.toml", &["cannot read no.toml: "]);
+    let table = "[[table]]\nbudget = 12\nloading = \"sync\"\nlru = [1]\n";
+    place.write("other.toml", table.as_bytes());
+    place.fail("cache plant.rpk --beside other.toml", &["other.toml: it has nothing", "but 12 % sync cold"]);
+    place.fail(
+        "cache plant.rpk --beside a.json --json a.json",
+        &["--beside: the report would be written over"],
+    );
     place.fail("cache plant.rpk --warm 0", &["--warm: 0 is not a number of flights"]);
     place.fail("cache plant.rpk --frames 0", &["--frames: 0"]);
     place.fail("cache plant.rpk --plot out.gif", &["out.gif: unknown kind of file"]);
@@ -302,6 +316,7 @@ fn a_flight_tells_what_each_cache_did() {
     assert!(text.is_empty() || text.contains("resident"), "{text}");
     let report = place.json("flight.json");
     assert_eq!(report["warm_flights"], 2);
+    assert_eq!(report["shadows"], false, "camera rays alone, as in the paper");
     let rows = report["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 1 + 2 * 2 * (1 + 3) * 2, "shares, policies, ways of loading, cold and warm");
     let ahead = rows.iter().filter(|row| row["cache"]["prefetch"] == "ahead");
@@ -313,6 +328,9 @@ fn a_flight_tells_what_each_cache_did() {
         let number = |key: &str| row[key].as_u64().unwrap_or_else(|| panic!("{key} in {row}"));
         assert_eq!(row["frames"].as_array().expect("frames").len(), 3);
         assert!(number("minimum") <= number("loads") + number("held"), "{row}");
+        let seconds = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"));
+        assert!(seconds("frame_p50") <= seconds("frame_p99"), "{row}");
+        assert!(0.0 < seconds("tile_p50") && seconds("tile_p50") <= seconds("tile_p99"), "{row}");
         let warm = row["warm"].as_bool().expect("warm or not");
         let evictions = |frame: &serde_json::Value| frame["cache"]["evictions"].as_u64().expect("a number");
         let evicted: u64 = row["frames"].as_array().expect("frames").iter().map(evictions).sum();
@@ -349,4 +367,123 @@ fn a_flight_tells_what_each_cache_did() {
     }
     let plot = String::from_utf8(place.read("flight.svg")).expect("text");
     assert!(plot.contains("40 % in memory, warm") && plot.contains("sieve async"), "it is a plot");
+    for label in ["0", "1", "2"] {
+        assert!(plot.contains(&format!(">\n{label}\n</text>")), "frame {label} is named as in the tables");
+    }
+    let reads = |number: &serde_json::Value| grouped(number.as_u64().expect("a number"));
+    for row in &rows[1..] {
+        let figures = format!("{}, least {}, ", reads(&row["loads"]), reads(&row["minimum"]));
+        assert!(plot.contains(&figures) && plot.contains("% hits"), "{figures} is not in the plot");
+    }
+}
+
+/// `1,234,567`.
+fn grouped(number: u64) -> String {
+    if number < 1000 {
+        number.to_string()
+    } else {
+        format!("{},{:03}", grouped(number / 1000), number % 1000)
+    }
+}
+
+#[test]
+fn caches_of_all_kinds_are_flown_and_kept_apart() {
+    let place = place(60_000);
+    let flight = "cache plant.rpk --frames 2 --size 64x64 --budgets 150 --policies fifo,lru --loading sync";
+    let text = place.succeed(&format!(
+        "{flight} --ways 1,16 --stripes 1,4 --block 1024,4096 --nodes none,0.4,0.4:lru --json kinds.json --plot kinds.svg"
+    ));
+    let report = place.json("kinds.json");
+    let rows = report["rows"].as_array().expect("rows");
+    let kinds = 2 * 2 * 2 * 3;
+    assert_eq!(rows.len(), 1 + kinds * 2 * 2, "kinds, policies, cold and warm");
+    for row in &rows[1..] {
+        let (shape, cache) = (&row["shape"], &row["cache"]);
+        for key in ["ways", "stripes", "block"] {
+            assert!(shape[key].is_u64() && shape[key] == cache[key], "{row}");
+        }
+        let policy =
+            if shape["nodes"]["policy"].is_null() { &row["policy"] } else { &shape["nodes"]["policy"] };
+        let has_nodes = !shape["nodes"].is_null();
+        assert_eq!(cache["nodes"].is_array(), has_nodes, "{row}");
+        assert!(!has_nodes || cache["nodes"][1] == *policy, "{row}");
+    }
+    let tables = report["tables"].as_array().expect("tables");
+    assert_eq!(tables.len(), kinds * 2, "kinds, cold and warm");
+    for (at, table) in tables.iter().enumerate() {
+        assert_eq!(table["policies"], serde_json::json!(["fifo", "lru"]), "{table}");
+        let is_like = |other: &serde_json::Value| {
+            (&other["shape"], &other["warm"]) == (&table["shape"], &table["warm"])
+        };
+        assert!(!tables[..at].iter().any(is_like), "no two are of one kind: {table}");
+    }
+    let head = text.lines().find(|line| line.starts_with("in memory")).expect("a heading");
+    assert!(head.contains("block  ways  stripes  nodes"), "{head}");
+    assert!(
+        text.contains("150 % in memory, sync, cold, block 1024, ways 1, stripes 4, nodes 0.4:lru"),
+        "{text}"
+    );
+    let plot = String::from_utf8(place.read("kinds.svg")).expect("text");
+    assert!(
+        plot.contains("150 % in memory, warm, block 4096, ways 16, stripes 1, nodes none"),
+        "it is a plot"
+    );
+
+    // One kind needs no columns; and there may be shadows.
+    let text = place.succeed(&format!("{flight} --ways 4 --shadows --json one.json"));
+    let head = text.lines().find(|line| line.starts_with("in memory")).expect("a heading");
+    assert!(!head.contains("ways") && text.contains("camera and shadow rays"), "{text}");
+    let report = place.json("one.json");
+    assert_eq!((&report["rows"][1]["cache"]["ways"], &report["shadows"]), (&4.into(), &true.into()));
+    place.succeed(&format!("{flight} --no-shadows --budgets 400 --policies lru"));
+
+    // As elsewhere, a part alone has the policy of the other cache.
+    let options = "--memory 1GiB --nodes 0.25 --policy clock --json part.json";
+    place.succeed(&format!("render plant.rpk -o part.png --size 64x48 {options}"));
+    let nodes = place.json("part.json")["cache"]["options"]["nodes"].clone();
+    assert_eq!(nodes, serde_json::json!([0.25, "clock"]));
+}
+
+#[test]
+fn rates_from_elsewhere_stand_beside_ours() {
+    let place = place(60_000);
+    let flight = "cache plant.rpk --frames 2 --size 64x64 --budgets 150 --policies fifo,lru --loading sync";
+    place.succeed(&format!("{flight} --json earlier.json"));
+    let earlier = place.json("earlier.json");
+    // Made up: nobody measured these.
+    let typed = "[[table]]\nbudget = 150\nloading = \"sync\"\nlru = [1000, 2500]\nclock = [1, 2]\n\
+                 [[table]]\nbudget = 150\nloading = \"sync\"\npass = \"warm\"\nfifo = [500]\n";
+    place.write("typed.toml", typed.as_bytes());
+    let text = place.succeed(&format!("{flight} --beside typed.toml --json ours.json"));
+    assert!(
+        text.contains("beside typed.toml, table 1: rays/s") && text.contains("lru ours  beside  ratio"),
+        "{text}"
+    );
+    let ours = place.json("ours.json");
+    let [cold, warm] = [0, 1].map(|at| ours["tables"][at].clone());
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("a number: {value}"));
+    let columns = cold["beside"]["policies"].as_array().expect("columns");
+    assert_eq!((columns.len(), &columns[0]["policy"]), (1, &"lru".into()), "what both have: {cold}");
+    for (frame, theirs) in [1000.0, 2500.0].into_iter().enumerate() {
+        assert_eq!(number(&columns[0]["beside"][frame]), theirs);
+        let rate = number(&cold["rays_per_s"][frame][1]);
+        assert_eq!(number(&columns[0]["ours"][frame]), rate);
+        assert_eq!(number(&columns[0]["ratio"][frame]), rate / theirs);
+        assert_eq!(number(&cold["times_paper"][frame][1]), rate / 12e3);
+    }
+    let column = &warm["beside"]["policies"][0];
+    assert_eq!(column["policy"], "fifo");
+    assert!(number(&column["beside"][0]) == 500.0 && column["beside"][1].is_null(), "{warm}");
+
+    // An earlier report is such a file, too.
+    place.succeed(&format!("{flight} --beside earlier.json --json ours.json"));
+    let ours = place.json("ours.json");
+    for (ours, earlier) in [0, 1].map(|at| (&ours["tables"][at], &earlier["tables"][at])) {
+        for policy in [0, 1] {
+            let column = &ours["beside"]["policies"][policy];
+            for frame in [0, 1] {
+                assert_eq!(column["beside"][frame], earlier["rays_per_s"][frame][policy], "{ours}");
+            }
+        }
+    }
 }

@@ -4,7 +4,7 @@ use super::directory::Shape;
 use super::known::Known;
 use super::policy::Replacement;
 use crate::error::{Error, Result};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
 /// What can be chosen about a cache.
@@ -46,7 +46,7 @@ impl Default for CacheOptions {
 }
 
 /// Which blocks come before they are needed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Prefetch {
     /// None.
@@ -85,7 +85,7 @@ impl FromStr for Prefetch {
 }
 
 /// Who reads blocks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loading {
     /// Who needs one, while its processor waits.

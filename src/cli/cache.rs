@@ -1,6 +1,6 @@
 //! `raypack cache SCENE.rpk`: what caches are worth along a camera path.
 
-use super::cache_options::ShapeArgs;
+use super::cache_options::ReadingArgs;
 use super::options::{AccuracyOption, as_option, orbit};
 use super::outputs::same_file;
 use super::progress::Bar;
@@ -14,7 +14,7 @@ use crate::render::Tuning;
 use crate::scene::Camera;
 use crate::simd::Isa;
 use crate::store::{self, is_scene};
-use crate::study::cache::{Options, plot, run as fly};
+use crate::study::cache::{Nodes, Options, Rates, plot, run as fly};
 use crate::study::plot::Format;
 use std::path::PathBuf;
 
@@ -40,8 +40,11 @@ pub struct Args {
     /// Width and height of frames
     #[arg(long, value_name = "WxH", default_value = "512x512", allow_hyphen_values = true)]
     size: String,
-    /// Leave out the shadows: camera rays alone, as in the seed paper
+    /// Cast shadows, too; without it there are camera rays alone, as in the seed paper
     #[arg(long)]
+    shadows: bool,
+    /// As it is by itself.
+    #[arg(long, hide = true, conflicts_with = "shadows")]
     no_shadows: bool,
     /// Shares of the scene's data that are in memory, in per cent
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "16,39")]
@@ -65,12 +68,21 @@ pub struct Args {
         default_value = CacheOptions::default().prefetch.name()
     )]
     prefetch: Vec<String>,
-    /// A cache of its own for nodes, with this part (0.01 to 0.99) of the memory and the same policy, as in the
-    /// seed paper
-    #[arg(long, value_name = "PART")]
-    nodes: Option<f32>,
+    /// A cache of its own for nodes, as in the seed paper, each as PART or PART:POLICY: the part (0.01 to 0.99) of the
+    /// memory that it has, and its policy, if that is another one; or none, for one cache of all
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "none")]
+    nodes: Vec<String>,
+    /// Bytes of a block: powers of two from 512 to 65536
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [CacheOptions::default().block])]
+    block: Vec<usize>,
+    /// Blocks that a set holds: more of them keep what is used better and take longer to choose from
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [CacheOptions::default().ways])]
+    ways: Vec<usize>,
+    /// Locks that sets share
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [CacheOptions::default().stripes])]
+    stripes: Vec<usize>,
     #[command(flatten)]
-    shape: ShapeArgs,
+    reading: ReadingArgs,
     /// Warm flights, of which the last is reported: in the first, some blocks still come that a kernel looks at which
     /// was not tried there before
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -80,7 +92,14 @@ pub struct Args {
     threads: usize,
     #[command(flatten)]
     accuracy: AccuracyOption,
-    /// Draw rays per second by frame: .svg or .png
+    /// Rates measured elsewhere, to print beside rays per second by frame: a .toml file or a .json report of this command
+    ///
+    /// A TOML file has a [[table]] for each: budget (per cent in memory, as --budgets), loading (sync or async), perhaps
+    /// prefetch (off, beside or ahead; without it, the table stands beside all of them), pass (cold or warm; cold if it is
+    /// left out), and for each policy, by its name, the rays per second of frames 0, 1 and so on: lru = [3000, 3100].
+    #[arg(long, value_name = "FILE")]
+    beside: Option<PathBuf>,
+    /// Draw rays per second by frame, and what was read beside the least that any policy could have read: .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -107,6 +126,11 @@ impl Args {
         if !is_scene(&self.scene) {
             let expected = "a cache needs a .rpk scene file; make one with raypack build";
             return Err(Error::UnknownFormat { path: self.scene.clone(), expected });
+        }
+        if let (Some(beside), Some(json)) = (&self.beside, self.json.file())
+            && same_file(beside, json)
+        {
+            return Err(Error::option("--beside", "the report would be written over it; give another name"));
         }
         if let Some(plot) = &self.plot {
             Format::of(plot)?;
@@ -142,28 +166,38 @@ impl Args {
             .map(|name| name.parse().map_err(|error: Error| renamed(error, "--policies")))
             .collect::<Result<_>>()?;
         let loadings =
-            self.loading.iter().map(|name| self.shape.loading(name)).collect::<Result<Vec<_>>>()?;
+            self.loading.iter().map(|name| self.reading.loading(name)).collect::<Result<Vec<_>>>()?;
         let prefetches = self.prefetch.iter().map(|name| name.parse()).collect::<Result<Vec<_>>>()?;
+        let nodes = self.nodes.iter().map(|text| match text.trim() {
+            "none" => Ok(None),
+            text => text.parse::<Nodes>().map(Some),
+        });
         let camera = self.camera.as_deref().map(Camera::parse).transpose()?;
         camera.as_ref().map(Camera::check).transpose()?;
         let options = Options {
             camera,
             orbit: orbit("--frames", self.frames, self.step)?,
             size: self.size.parse()?,
-            shadows: !self.no_shadows,
+            shadows: self.shadows,
             budgets: self.budgets.iter().map(|percent| percent / 100.0).collect(),
             policies,
             loadings,
             prefetches,
-            cache: self.shape.options(),
-            nodes: self.nodes,
+            blocks: self.block.clone(),
+            ways: self.ways.clone(),
+            stripes: self.stripes.clone(),
+            nodes: nodes.collect::<Result<_>>()?,
+            cache: CacheOptions { direct: self.reading.direct(), ..CacheOptions::default() },
             warm: self.warm,
             threads: tuning.worker_count(),
             accuracy,
             isa: Isa::from_env()?,
+            beside: self.beside.as_deref().map(Rates::read).transpose()?,
         };
-        for trial in options.trials() {
-            trial.options.check()?;
+        let trials = options.trials();
+        trials.iter().try_for_each(|trial| trial.options.check())?;
+        if let Some(rates) = &options.beside {
+            rates.check(&trials)?;
         }
         Ok(options)
     }

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Accuracy;
 use crate::simd::Isa;
 use crate::store;
+use crate::study::cache::Nodes;
 use crate::study::resident;
 use serde::Serialize;
 use std::path::Path;
@@ -23,16 +24,19 @@ pub struct CacheArgs {
     /// Who reads: async (threads of their own, while other tiles go on) or sync (who needs a block waits for it)
     #[arg(long, value_name = "async|sync", default_value = "async")]
     loading: String,
-    /// A cache of its own for nodes, as PART:POLICY: the part (0.01 to 0.99) of the memory that it has
-    #[arg(long, value_name = "PART:POLICY")]
+    /// A cache of its own for nodes: the part (0.01 to 0.99) of the memory that it has, and its policy, if that is another
+    /// one than --policy
+    #[arg(long, value_name = "PART[:POLICY]")]
     nodes: Option<String>,
     #[command(flatten)]
     shape: ShapeArgs,
+    #[command(flatten)]
+    reading: ReadingArgs,
 }
 
 /// What caches are like, whatever their policy.
 #[derive(Clone, Debug, clap::Args)]
-pub struct ShapeArgs {
+struct ShapeArgs {
     /// Bytes of a block: a power of two from 512 to 65536
     #[arg(long, value_name = "BYTES", default_value_t = CacheOptions::default().block)]
     block: usize,
@@ -42,6 +46,11 @@ pub struct ShapeArgs {
     /// Locks that sets share
     #[arg(long, value_name = "N", default_value_t = CacheOptions::default().stripes)]
     stripes: usize,
+}
+
+/// How blocks are read.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReadingArgs {
     /// Reads at a time, with loading async: as many threads read what those who need it leave to them
     #[arg(long, value_name = "N", default_value_t = Loading::LOADERS)]
     loaders: usize,
@@ -56,7 +65,7 @@ impl CacheArgs {
     /// # Errors
     /// One makes no sense.
     pub fn options(&self, prefetch: Option<Prefetch>) -> Result<CacheOptions> {
-        let loading = self.shape.loading(&self.loading)?;
+        let loading = self.reading.loading(&self.loading)?;
         let prefetch = match prefetch {
             Some(prefetch) if loading.loaders() == 0 && prefetch != Prefetch::Off => {
                 let message =
@@ -65,13 +74,12 @@ impl CacheArgs {
             }
             asked => asked.unwrap_or_default(),
         };
-        let options = CacheOptions {
-            policy: self.policy.parse()?,
-            nodes: self.nodes.as_deref().map(nodes).transpose()?,
-            loading,
-            prefetch,
-            ..self.shape.options()
-        };
+        let policy = self.policy.parse()?;
+        let nodes = self.nodes.as_deref().map(str::parse::<Nodes>).transpose()?;
+        let ShapeArgs { block, ways, stripes } = self.shape;
+        let nodes = nodes.map(|nodes| nodes.beside(policy));
+        let direct = self.reading.direct();
+        let options = CacheOptions { block, ways, stripes, policy, nodes, loading, prefetch, direct };
         options.check()?;
         Ok(options)
     }
@@ -121,11 +129,10 @@ impl CacheArgs {
     }
 }
 
-impl ShapeArgs {
-    /// The options, with all else as it is by itself; not checked.
-    pub fn options(&self) -> CacheOptions {
-        let Self { block, ways, stripes, direct, .. } = *self;
-        CacheOptions { block, ways, stripes, direct, ..CacheOptions::default() }
+impl ReadingArgs {
+    /// Whether reads go past the system's own memory of the file.
+    pub fn direct(&self) -> bool {
+        self.direct
     }
 
     /// `sync` or `async`.
@@ -139,13 +146,6 @@ impl ShapeArgs {
             _ => Err(Error::option("--loading", format!("\"{name}\" is neither async nor sync"))),
         }
     }
-}
-
-/// `0.25:lru`.
-fn nodes(text: &str) -> Result<(f32, Replacement)> {
-    let wrong = || Error::option("--nodes", format!("\"{text}\" is not PART:POLICY, such as 0.25:lru"));
-    let (part, policy) = text.split_once(':').ok_or_else(wrong)?;
-    Ok((part.trim().parse().map_err(|_| wrong())?, policy.trim().parse()?))
 }
 
 /// What a report says about a scene that is not all in memory.

@@ -30,4 +30,5 @@ pub use order::{Tile, tiles};
 pub use renderer::Renderer;
 pub use scheduler::{Outcome, Sharing, Workers};
 pub use settings::{Aovs, RenderSettings, Size, Tuning};
+pub(crate) use stats::quantile;
 pub use stats::{FrameStats, RayCount};

@@ -17,7 +17,9 @@ use crate::scene::effects::Effect;
 use crate::scene::{Camera, Lighting, Surface};
 use crate::traverse::{Accel, DispatchPool, Kernel, PacketWidth, Places, RayPacket};
 use std::collections::HashSet;
+use std::mem;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Makes pictures of one scene with one set of settings.
@@ -41,6 +43,8 @@ pub struct Renderer<'a, S = Mesh> {
     appearance: Option<&'a Appearance>,
     /// How far its accuracy goes.
     limits: Limits,
+    /// Seconds that each tile took, since they were last taken, if they are kept.
+    tile_times: Option<Mutex<Vec<f32>>>,
 }
 
 /// A frame that is to be drawn.
@@ -83,6 +87,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
             stand_in,
             appearance: None,
             limits: Limits::default(),
+            tile_times: None,
         })
     }
 
@@ -102,6 +107,27 @@ impl<'a, S: Surface> Renderer<'a, S> {
     pub fn with_limits(self, limits: Limits) -> Result<Self> {
         limits.check()?;
         Ok(Self { limits, ..self })
+    }
+
+    /// The same, and the seconds that each tile takes are kept until they are [taken](Self::take_tile_times).
+    pub(crate) fn keeping_tile_times(self) -> Self {
+        Self { tile_times: Some(Mutex::default()), ..self }
+    }
+
+    /// The seconds that each tile took, of all frames since these were last taken; none if they are not kept.
+    pub(crate) fn take_tile_times(&self) -> Vec<f32> {
+        let taken =
+            |times: &Mutex<Vec<f32>>| mem::take(&mut *times.lock().unwrap_or_else(PoisonError::into_inner));
+        self.tile_times.as_ref().map(taken).unwrap_or_default()
+    }
+
+    /// Below what seconds half and 99 % of a frame's tiles stayed.
+    fn tile_quantiles(&self, times: impl Iterator<Item = f32>) -> [f64; 2] {
+        let mut times: Vec<f32> = times.collect();
+        if let Some(kept) = &self.tile_times {
+            kept.lock().unwrap_or_else(PoisonError::into_inner).extend(&times);
+        }
+        [0.5, 0.99].map(|share| quantile(&mut times, share))
     }
 
     /// The settings.
@@ -310,8 +336,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let mut costs = Tallies::default();
         outcome.states.iter().for_each(|scratch| costs += scratch.waves.tallies);
         let camera: Tally = outcome.states.iter().map(|scratch| scratch.waves.camera).sum();
-        let mut times: Vec<f32> =
-            outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied()).collect();
+        let tiles = outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied());
+        let [tile_p50, tile_p99] = self.tile_quantiles(tiles);
         let seconds = start.elapsed().as_secs_f64();
         let threads = tuning.worker_count();
         let samples: u64 = outcome.states.iter().map(|scratch| scratch.samples).sum();
@@ -321,8 +347,8 @@ impl<'a, S: Surface> Renderer<'a, S> {
             total: RayCount::of(camera.rays + costs.rays(), seconds),
             seconds,
             tiles: self.tiles.len(),
-            tile_p50: quantile(&mut times, 0.5),
-            tile_p99: quantile(&mut times, 0.99),
+            tile_p50,
+            tile_p99,
             threads,
             pinned: outcome.pinned,
             samples: samples as f64 / size.pixels() as f64,
@@ -434,16 +460,16 @@ impl<'a, S: Surface> Renderer<'a, S> {
     ) -> FrameStats {
         let camera: Tally = outcome.states.iter().map(|scratch| scratch.camera).sum();
         let shadow: Tally = outcome.states.iter().map(|scratch| scratch.shadow).sum();
-        let mut times: Vec<f32> =
-            outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied()).collect();
+        let tiles = outcome.states.iter().flat_map(|scratch| scratch.tiles.iter().copied());
+        let [tile_p50, tile_p99] = self.tile_quantiles(tiles);
         FrameStats {
             camera: RayCount::new(camera, threads),
             shadow: RayCount::new(shadow, threads),
             total: RayCount::of(camera.rays + shadow.rays, seconds),
             seconds,
             tiles: self.tiles.len(),
-            tile_p50: quantile(&mut times, 0.5),
-            tile_p99: quantile(&mut times, 0.99),
+            tile_p50,
+            tile_p99,
             threads,
             pinned: outcome.pinned,
             samples: f64::from(self.settings.samples),

@@ -54,7 +54,7 @@ impl RayCount {
 }
 
 /// The time that a share of some times stays below: 0 of none.
-pub(super) fn quantile(times: &mut [f32], share: f64) -> f64 {
+pub(crate) fn quantile(times: &mut [f32], share: f64) -> f64 {
     if times.is_empty() {
         return 0.0;
     }

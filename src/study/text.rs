@@ -35,7 +35,7 @@ pub fn grid(lines: &[Vec<String>]) -> String {
         for (c, (cell, &width)) in line.iter().zip(&widths).enumerate() {
             // A heading stands as its column's cells do.
             let sample = if i == 0 { lines.get(1).and_then(|l| l.get(c)).unwrap_or(cell) } else { cell };
-            let number = sample == "-" || sample.parse::<f64>().is_ok();
+            let number = sample == "-" || sample.replace(',', "").parse::<f64>().is_ok();
             let gap = if c == 0 { "" } else { "  " };
             let written =
                 if number { write!(row, "{gap}{cell:>width$}") } else { write!(row, "{gap}{cell:<width$}") };
@@ -56,6 +56,8 @@ mod tests {
         let lines = [["a", "n", "x"], ["long", "12.5", "y"], ["b", "3", ""]];
         let lines: Vec<Vec<String>> = lines.iter().map(|l| l.map(String::from).to_vec()).collect();
         assert_eq!(grid(&lines), "a        n  x\nlong  12.5  y\nb        3\n");
+        let lines = [["n"], ["1,234"], ["5"]].map(|line| line.map(String::from).to_vec());
+        assert_eq!(grid(&lines), "    n\n1,234\n    5\n");
     }
 
     #[test]

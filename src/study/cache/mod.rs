@@ -8,20 +8,25 @@
 //! The system keeps files in its own memory, where a read costs some microseconds instead of what the disk
 //! takes. [`CacheOptions::direct`] goes past that; reports say which it was.
 
+mod beside;
 mod by_frame;
 pub mod minimum;
 #[cfg(feature = "accuracy")]
 pub mod plot;
 mod report;
+mod shape;
+mod table;
 
+pub use beside::{Beside, Column, Rates};
 pub use by_frame::{FrameTable, PAPER, Paper};
 pub use report::{FrameRow, Report, Row};
+pub use shape::{Nodes, Shape};
 
 use crate::cache::policy::Replacement;
 use crate::cache::{CacheOptions, Cached, Loading, Prefetch};
 use crate::error::Result;
 use crate::geometry::Accuracy;
-use crate::render::{RenderSettings, Renderer, Size};
+use crate::render::{RenderSettings, Renderer, Size, quantile};
 use crate::scene::{CachedSurface, Camera, Lighting, Orbit, Surface};
 use crate::simd::Isa;
 use crate::store;
@@ -49,11 +54,16 @@ pub struct Options {
     pub loadings: Vec<Loading>,
     /// Which blocks come before they are needed; where there are loaders to see to that.
     pub prefetches: Vec<Prefetch>,
+    /// Bytes of a block.
+    pub blocks: Vec<usize>,
+    /// Blocks that a set holds.
+    pub ways: Vec<usize>,
+    /// Locks that sets share.
+    pub stripes: Vec<usize>,
+    /// A cache of its own for nodes; `None` for one cache of all.
+    pub nodes: Vec<Option<Nodes>>,
     /// All else about the caches.
     pub cache: CacheOptions,
-    /// The part of the memory that nodes have to themselves, in a cache of the same policy; `None` for one
-    /// cache of all.
-    pub nodes: Option<f32>,
     /// Warm flights, at least one: the last is reported. In the first some blocks still come that kernels looked at
     /// which were not tried before. Where there is room for all blocks, all are read before.
     pub warm: u32,
@@ -63,6 +73,8 @@ pub struct Options {
     pub accuracy: Accuracy,
     /// The instruction set.
     pub isa: Isa,
+    /// What was measured elsewhere, to stand beside rays a second by frame.
+    pub beside: Option<Rates>,
 }
 
 /// One cache.
@@ -70,29 +82,45 @@ pub struct Options {
 pub struct Trial {
     /// The share of the data that is in memory.
     pub budget: f64,
-    /// All else.
+    /// What it is like, as it was asked for.
+    pub shape: Shape,
+    /// All of it.
     pub options: CacheOptions,
 }
 
 impl Options {
     /// Everything that is tried, in the order of the report.
     pub fn trials(&self) -> Vec<Trial> {
+        let shapes = self.shapes();
         let mut trials = Vec::new();
         for &budget in &self.budgets {
-            for &policy in &self.policies {
-                for &loading in &self.loadings {
-                    // Who needs a block reads it: nobody asks for any before.
-                    let prefetches =
-                        if loading.loaders() > 0 { &self.prefetches[..] } else { &[Prefetch::Off] };
-                    for &prefetch in prefetches {
-                        let nodes = self.nodes.map(|part| (part, policy));
-                        let options = CacheOptions { policy, loading, prefetch, nodes, ..self.cache };
-                        trials.push(Trial { budget, options });
+            for &shape in &shapes {
+                for &policy in &self.policies {
+                    for &loading in &self.loadings {
+                        // Who needs a block reads it: nobody asks for any before.
+                        let prefetches =
+                            if loading.loaders() > 0 { &self.prefetches[..] } else { &[Prefetch::Off] };
+                        for &prefetch in prefetches {
+                            let options = CacheOptions { policy, loading, prefetch, ..self.cache };
+                            trials.push(Trial { budget, shape, options: shape.options(options) });
+                        }
                     }
                 }
             }
         }
         trials
+    }
+
+    fn shapes(&self) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        for &block in &self.blocks {
+            for &ways in &self.ways {
+                for &stripes in &self.stripes {
+                    shapes.extend(self.nodes.iter().map(|&nodes| Shape { block, ways, stripes, nodes }));
+                }
+            }
+        }
+        shapes
     }
 }
 
@@ -111,13 +139,14 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
     let step = || progress(done.fetch_add(1, Ordering::Relaxed) as f64 / steps as f64);
 
     let surface = file.stored()?;
-    let renderer = Renderer::new(&resident, &surface, flight.settings.clone())?;
-    let mut frames = Vec::new();
-    for _ in 0..=warm {
-        frames = flight.fly(&renderer, None)?;
+    let renderer = Renderer::new(&resident, &surface, flight.settings.clone())?.keeping_tile_times();
+    for _ in 0..warm {
+        flight.fly(&renderer, None)?;
         step();
     }
-    let mut rows = vec![Row::resident(frames)];
+    let (frames, tiles) = flight.fly(&renderer, None)?;
+    step();
+    let mut rows = vec![Row::resident(frames, tiles)];
     drop(renderer);
     drop((surface, resident));
 
@@ -128,7 +157,7 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
         let accel =
             Accel::of_cached(Arc::clone(&cached)).with_isa(options.isa).with_accuracy(options.accuracy);
         let surface = CachedSurface::new(Arc::clone(&cached), file)?;
-        let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?;
+        let renderer = Renderer::new(&accel, &surface, flight.settings.clone())?.keeping_tile_times();
         cached.trace_uses(true);
         for pass in 0..=warm {
             if pass == 1 && cached.holds_all() {
@@ -136,11 +165,11 @@ pub fn run(file: &store::File, options: &Options, progress: &dyn Fn(f64)) -> Res
                 cached.trace_uses(false);
                 cached.fill()?;
             }
-            let frames = flight.fly(&renderer, Some(&cached))?;
+            let flown = flight.fly(&renderer, Some(&cached))?;
             let uses = cached.take_uses();
             if pass == 0 || pass == warm {
                 let minimum = minimum::misses(&uses, cached.plan().held(), pass > 0);
-                rows.push(Row::cached(&trial, pass > 0, memory, &cached, frames, minimum));
+                rows.push(Row::cached(&trial, pass > 0, memory, &cached, flown, minimum));
             }
             step();
         }
@@ -169,8 +198,12 @@ impl Flight {
         Self { cameras, lighting, settings, data: Cached::data_bytes_of(file) }
     }
 
-    /// Renders all frames, and says what each took.
-    fn fly<S: Surface>(&self, renderer: &Renderer<'_, S>, cached: Option<&Cached>) -> Result<Vec<FrameRow>> {
+    /// Renders all frames, and says what each took, and below what seconds half and 99 % of all tiles stayed.
+    fn fly<S: Surface>(
+        &self,
+        renderer: &Renderer<'_, S>,
+        cached: Option<&Cached>,
+    ) -> Result<(Vec<FrameRow>, [f64; 2])> {
         let frame = |(number, camera): (usize, &Camera)| {
             // Each pass is a path of its own: what comes after its last frame is no part of it.
             renderer.announce(self.cameras.get(number + 1).copied());
@@ -184,7 +217,9 @@ impl Flight {
                 cache,
             })
         };
-        self.cameras.iter().enumerate().map(frame).collect()
+        let frames = self.cameras.iter().enumerate().map(frame).collect::<Result<_>>()?;
+        let mut times = renderer.take_tile_times();
+        Ok((frames, [0.5, 0.99].map(|share| quantile(&mut times, share))))
     }
 
     fn report(&self, file: &store::File, options: &Options, rows: Vec<Row>) -> Report {
@@ -206,9 +241,10 @@ impl Flight {
             raypack: env!("CARGO_PKG_VERSION"),
             build: machine::build_profile(),
             date: machine::date(),
-            tables: FrameTable::all(&rows),
+            tables: FrameTable::all(&rows, options.beside.as_ref()),
             rows,
             paper: PAPER,
+            beside: options.beside.as_ref().map(|rates| rates.path().display().to_string()),
         }
     }
 }
