@@ -108,8 +108,8 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<()> {
-    let options = args.options()?;
     args.check_files()?;
+    let options = args.options()?;
     let file = store::File::open(&args.scene)?;
     let bar = Bar::new("flying");
     let report = fly(&file, &options, &|part| bar.set(part))?;
