@@ -1,4 +1,8 @@
 //! Which byte of which array is in which block.
+//!
+//! A block is a piece of one array. What a page or a leaf needs of several comes together, but from several blocks; blocks
+//! that hold all of a page side by side were measured and save next to nothing where memory is short
+//! (`docs/out-of-core.md`), and an array would no longer mean the same in memory as in the file.
 
 use std::ops::Range;
 
