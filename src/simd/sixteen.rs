@@ -16,22 +16,25 @@ pub trait Sixteen: Lanes<16> {
         [Self::load(&columns[0]), Self::load(&columns[1]), Self::load(&columns[2]), Self::load(&columns[3])]
     }
 
-    /// The least lane of each row: that of row `i` in lane `i`. No lane may be NaN.
+    /// The least number of each row among those whose bit is set in `counted`: that of row `i` in lane `i`, infinity
+    /// if there is none. None that counts may be NaN.
     #[inline(always)]
-    fn least_of_rows(rows: [Self; 16]) -> Self {
+    fn least_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
         let mut least = [0.0; 16];
-        for lane in 0..16 {
-            least[lane] = rows[lane].least();
+        for i in 0..16 {
+            let (counts, row) = (Self::mask_from_bits(counted[i]), Self::load(&rows[i]));
+            least[i] = Self::select(counts, row, Self::splat(f32::INFINITY)).least();
         }
         Self::load(&least)
     }
 
-    /// The greatest lane of each row, likewise.
+    /// The greatest number of each row likewise, minus infinity if there is none.
     #[inline(always)]
-    fn greatest_of_rows(rows: [Self; 16]) -> Self {
+    fn greatest_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
         let mut greatest = [0.0; 16];
-        for lane in 0..16 {
-            greatest[lane] = rows[lane].greatest();
+        for i in 0..16 {
+            let (counts, row) = (Self::mask_from_bits(counted[i]), Self::load(&rows[i]));
+            greatest[i] = Self::select(counts, row, Self::splat(f32::NEG_INFINITY)).greatest();
         }
         Self::load(&greatest)
     }

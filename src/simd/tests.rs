@@ -127,16 +127,23 @@ fn check_sixteen<L: Sixteen>() {
             assert_eq!(column[j], fours[(j * 5) & 15][i], "number {i} of record {j}");
         }
     }
-    // Row `i` has its least lane at `i + turn`, the greatest one eight lanes farther.
+    // Row `i` has its least number at `i + turn`, the greatest one eight lanes farther; beside them stand numbers
+    // that do not count, one of them none.
     for turn in 0..16 {
-        let mut rows = [L::splat(0.0); 16];
+        let (mut rows, mut counted) = ([[0.0; 16]; 16], [0xffff; 16]);
         for i in 0..16 {
-            let mut row: [f32; 16] = std::array::from_fn(|lane| (lane * 7 % 5) as f32);
-            (row[(i + turn) & 15], row[(i + turn + 8) & 15]) = (-10.0 - i as f32, 10.0 + i as f32);
-            rows[i] = L::load(&row);
+            let at = |lane: usize| (i + turn + lane) & 15;
+            rows[i] = std::array::from_fn(|lane| (lane * 7 % 5) as f32);
+            (rows[i][at(0)], rows[i][at(8)]) = (-10.0 - i as f32, 10.0 + i as f32);
+            (rows[i][at(1)], rows[i][at(2)], rows[i][at(3)]) = (-99.0, 99.0, f32::NAN);
+            counted[i] &= !(1 << at(1) | 1 << at(2) | 1 << at(3));
         }
-        assert_eq!(L::least_of_rows(rows).store(), std::array::from_fn(|i| -10.0 - i as f32));
-        assert_eq!(L::greatest_of_rows(rows).store(), std::array::from_fn(|i| 10.0 + i as f32));
+        (counted[5], counted[9]) = (0, 1 << ((9 + turn) & 15));
+        let mut least: [f32; 16] = std::array::from_fn(|i| -10.0 - i as f32);
+        let mut greatest: [f32; 16] = std::array::from_fn(|i| 10.0 + i as f32);
+        (least[5], greatest[5], greatest[9]) = (f32::INFINITY, f32::NEG_INFINITY, -19.0);
+        assert_eq!(L::least_of_rows(&rows, &counted).store(), least);
+        assert_eq!(L::greatest_of_rows(&rows, &counted).store(), greatest);
     }
 }
 

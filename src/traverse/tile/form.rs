@@ -34,8 +34,8 @@ const NARROWEST: f64 = 1e-12;
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub struct Seen {
-    /// Each packet's rays' places.
-    pub place: [[[f32; 16]; 2]; PACKETS],
+    /// The first coordinate of each packet's rays' places, then the other one.
+    pub place: [[[f32; 16]; PACKETS]; 2],
     /// The depth at which `t` is 0.
     pub start: [[f32; 16]; PACKETS],
     /// By how much the depth grows with `t`: less than 0 for rays toward the apex.
@@ -48,7 +48,7 @@ pub struct Seen {
 impl Seen {
     pub const fn new() -> Self {
         const ROWS: [[f32; 16]; PACKETS] = [[0.0; 16]; PACKETS];
-        Self { place: [[[0.0; 16]; 2]; PACKETS], start: ROWS, speed: ROWS, near: ROWS, far: ROWS }
+        Self { place: [ROWS; 2], start: ROWS, speed: ROWS, near: ROWS, far: ROWS }
     }
 }
 
@@ -120,7 +120,7 @@ pub fn from_apex<L: Sixteen>(
     active: &mut [u32; PACKETS],
 ) -> Option<Extent<L>> {
     let (zero, endless) = (L::splat(0.0), L::splat(f32::INFINITY));
-    let mut places = [[[0.0; 16]; 2]; PACKETS];
+    let mut places = [[[0.0; 16]; PACKETS]; 2];
     let (mut nearest, mut farthest) = ([0.0; PACKETS], [f32::INFINITY; PACKETS]);
     let mut misfits = 0;
     for (packet, rays) in rays.iter().enumerate() {
@@ -144,7 +144,7 @@ pub fn from_apex<L: Sixteen>(
             leave_out(&mut active[packet], &mut misfits)?;
             continue;
         }
-        places[packet] = [slopes[0].store(), slopes[1].store()];
+        (places[0][packet], places[1][packet]) = (slopes[0].store(), slopes[1].store());
         // Rays from a camera mostly have no ends of their own.
         let endless = tnear.eq(zero) & tfar.eq(endless);
         if endless.bits() & lanes != lanes {
@@ -225,7 +225,7 @@ pub fn of_form<L: Sixteen>(
         let counts = L::mask_from_bits(lanes);
         range = range.max(L::select(counts, o[0].abs().max(o[1].abs()).max(o[2].abs()), zero));
         let places = if form == Form::Along { crossing } else { slopes };
-        seen.place[packet] = [places[0].store(), places[1].store()];
+        (seen.place[0][packet], seen.place[1][packet]) = (places[0].store(), places[1].store());
         seen.start[packet] = o[2].store();
         seen.speed[packet] = d[2].store();
         seen.near[packet] = near.store();
@@ -234,8 +234,8 @@ pub fn of_form<L: Sixteen>(
     let range = range.greatest();
     let stray = if form == Form::Toward { range * STRAY + place * STRAY_OF_PLACE } else { 0.0 };
     let (low, high) = rectangles::<L>(&seen.place, active);
-    let nearest = L::least_of_rows(rows(&seen.near, active, f32::INFINITY));
-    let farthest = L::greatest_of_rows(rows(&seen.far, active, f32::NEG_INFINITY));
+    let nearest = L::least_of_rows(&seen.near, active);
+    let farthest = L::greatest_of_rows(&seen.far, active);
     Some((extent(low, high, nearest, farthest, range), Spread { range, stray }))
 }
 
@@ -266,32 +266,16 @@ fn ends<L: Sixteen>(lanes: u32, near: L, far: L) -> (f32, f32) {
     (nearest, L::select(counts, far, L::splat(f32::NEG_INFINITY)).greatest())
 }
 
-/// A number of each packet's rays, `other` for those that do not count.
-#[inline(always)]
-fn rows<L: Sixteen>(numbers: &[[f32; 16]; PACKETS], active: &[u32; PACKETS], other: f32) -> [L; PACKETS] {
-    let mut rows = [L::splat(other); PACKETS];
-    for packet in 0..PACKETS {
-        rows[packet] =
-            L::select(L::mask_from_bits(active[packet]), L::load(&numbers[packet]), L::splat(other));
-    }
-    rows
-}
-
 /// The least and the greatest places of each packet.
 #[inline(always)]
-fn rectangles<L: Sixteen>(places: &[[[f32; 16]; 2]; PACKETS], active: &[u32; PACKETS]) -> ([L; 2], [L; 2]) {
-    let (mut low, mut high) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
-    for side in 0..2 {
-        let (mut least, mut greatest) = ([L::splat(0.0); PACKETS], [L::splat(0.0); PACKETS]);
-        for packet in 0..PACKETS {
-            let (counts, row) = (L::mask_from_bits(active[packet]), L::load(&places[packet][side]));
-            least[packet] = L::select(counts, row, L::splat(f32::INFINITY));
-            greatest[packet] = L::select(counts, row, L::splat(f32::NEG_INFINITY));
-        }
-        low[side] = L::least_of_rows(least);
-        high[side] = L::greatest_of_rows(greatest);
-    }
-    (low, high)
+fn rectangles<L: Sixteen>(
+    [first, second]: &[[[f32; 16]; PACKETS]; 2],
+    active: &[u32; PACKETS],
+) -> ([L; 2], [L; 2]) {
+    (
+        [L::least_of_rows(first, active), L::least_of_rows(second, active)],
+        [L::greatest_of_rows(first, active), L::greatest_of_rows(second, active)],
+    )
 }
 
 /// The extents of packets whose rays' origins are up to `range` away from the apex.

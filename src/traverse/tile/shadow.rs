@@ -125,8 +125,8 @@ where
                 continue;
             }
             let mut open = R::mask_from_bits(lanes);
-            let [a, b] = &self.seen.place[packet];
-            let (a, b) = (load_part::<N, R>(a, part), load_part::<N, R>(b, part));
+            let [a, b] = &self.seen.place;
+            let (a, b) = (load_part::<N, R>(&a[packet], part), load_part::<N, R>(&b[packet], part));
             let near = load_part::<N, R>(&self.seen.near[packet], part);
             let far = load_part::<N, R>(&self.seen.far[packet], part);
             for triangle in bits(chosen) {
