@@ -250,7 +250,7 @@ fn several_models_larger_than_the_memory_given_are_built_piece_by_piece() {
     let files =
         ["few.ply", "hills.glb", "hills.mtl", "hills.obj", "hills.stl", "parts.rpk", "some.rpk", "whole.rpk"];
     assert_eq!(place.files(), files);
-    // Refused before anything is read: what is no OBJ further on is not noticed.
+    // Together they are too much, which is told with what would do.
     let refused = ["--memory: building ", "triangles piece by piece takes", "MiB: give "];
     place.fail("build hills.stl hills.glb -o parts.rpk --memory 60MiB", &refused);
 }
