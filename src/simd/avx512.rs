@@ -183,8 +183,8 @@ fn side_by_side(fours: [&[f32; 4]; 4]) -> __m512 {
     avx512!(_mm512_insertf32x4::<3>(row, _mm_loadu_ps(d.as_ptr())))
 }
 
-/// Sixteen rows folded into one: lane `i` is what is left of what counts in row `i`. Two rows at a time, what is left of each half as
-/// long, so that it takes 45 operations instead of 8 for each row.
+/// Sixteen rows folded into one: lane `i` is what is left of what counts in row `i`. Two rows at a time, what is left of
+/// each half as long, so that it takes 45 operations instead of 8 for each row.
 macro_rules! fold_rows {
     ($rows:expr, $counted:expr, $other:expr, $of:ident) => {{
         let other = Self::splat($other);
