@@ -151,13 +151,15 @@ impl Directory {
         Self { shape, stripes, held: CachePadded::default() }
     }
 
-    /// Blocks that a set with so many may hold at the moment. As long as there is room for more in all, as many as come:
-    /// otherwise some sets would have to give blocks up that others have room for. From then on, what has more than its
-    /// ways gives up two for each that comes.
+    /// Blocks that a set with so many, the one that comes among them, may hold at the moment. As long as there is room in
+    /// all, as many as come: otherwise some sets would have to give blocks up that others have room for. From then on, one
+    /// has to go for each that comes, and two where a set has more than its ways.
     fn ways(&self, held: usize) -> usize {
-        let blocks = self.shape.blocks();
-        let has_room = self.held.load(Ordering::Relaxed) < blocks - blocks.div_ceil(16);
-        if has_room { usize::MAX } else { self.shape.ways.max(held.saturating_sub(2)) }
+        match self.held.load(Ordering::Relaxed) <= self.shape.blocks() {
+            true => usize::MAX,
+            false if held > self.shape.ways => self.shape.ways.max(held - 2),
+            false => held.saturating_sub(1).max(1),
+        }
     }
 
     /// Has a set be within what it may hold, and counts what goes.
@@ -412,21 +414,23 @@ mod tests {
     #[test]
     fn a_full_set_holds_more_while_others_have_room() {
         let small = Small::new(8, 2);
-        // All of one set, until there is hardly room for more in all.
+        // All of one set, until there is no room for more in all.
         let come = |block| {
             let (asked, gone) = small.pin(block);
             assert_eq!(asked, Asked::Absent, "{block}");
             small.arrived(block);
             small.pins.unpin(block);
             assert_eq!(small.directory.len(), small.directory.held.load(Ordering::Relaxed));
+            assert!(small.directory.len() <= 16);
             gone
         };
-        assert!((0..14).all(|i| come(8 * i).is_empty()));
-        assert_eq!(come(8 * 14), [0, 8], "two for one");
-        assert!(come(1).is_empty(), "its own set has room");
+        assert!((0..16).all(|i| come(8 * i).is_empty()));
+        assert_eq!(come(8 * 16), [0, 8], "two for one");
+        assert!(come(1).is_empty(), "there is room that the full set has given up");
+        assert_eq!(come(9), [1], "there is none, and its own set is not the one that has too many");
         small.directory.shrink(&small.words, &small.pins, &mut |_| ());
         assert_eq!(small.directory.len(), 3, "two of the full set");
-        assert!((2..10).all(|i| come(8 * i + 2).is_empty()), "there is room again");
+        assert!((2..15).all(|i| come(8 * i + 2).is_empty()), "there is room again");
     }
 
     #[test]
