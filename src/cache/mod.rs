@@ -173,7 +173,8 @@ impl Cached {
         let own = |memory| {
             let knowing = threads * Known::bytes(Known::lines(memory, threads));
             // A thread that walks may look at a surface meanwhile.
-            knowing + 2 * workers * (Scraps::BYTES + reading) + options.loading.loaders() * reading
+            // But it reads one block at a time.
+            knowing + 2 * workers * Scraps::BYTES + (workers + options.loading.loaders()) * reading
         };
         let overhead = Blocks::overhead(layout.blocks()) + resident.upper.len() * 12 + beside;
         let each = options.block + Blocks::OVERHEAD_HERE;
