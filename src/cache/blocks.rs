@@ -8,6 +8,7 @@ use super::ahead::Ahead;
 use super::deadline::Deadline;
 use super::directory::{Directory, Pins};
 use super::epoch::Epochs;
+use super::eras::is_before;
 use super::gate::Gate;
 use super::known::Known;
 use super::layout::Layout;
@@ -37,6 +38,10 @@ const SESSIONS_PER_TICK: u32 = 64;
 
 /// What stands for the tick of the frame where there is none: then ticks go on with squares.
 const BY_SQUARES: u32 = u32::MAX;
+
+/// Ticks that an [era](super::eras) lasts at most: 1024 frames of 512 x 512. (With 64 frames, looking at lists anew took 2
+/// to 3 % of them.)
+const ERA: u32 = 1 << 14;
 
 /// All blocks of a scene, and those of them that are here.
 #[derive(Debug)]
@@ -72,8 +77,9 @@ pub struct Blocks {
     pub(super) most_committed: AtomicUsize,
     /// Blocks that had to go in this frame.
     pub gone: AtomicU32,
-    /// One tick for all of a frame, as long as nothing has to go in it and had to in the one before: nobody asks then in
-    /// what order blocks were used, and to write it down is to take lines of the cache from other threads.
+    /// One tick for all of a frame, as long as [hardly anything](Self::is_calm) has to go in it and had to in the one before:
+    /// nobody asks then in what order blocks were used, and to write it down is to take lines of the cache from other
+    /// threads.
     frame_tick: AtomicU32,
     /// How often a thread has waited since this was last cleared.
     pub waits: AtomicU32,
@@ -145,11 +151,17 @@ impl Blocks {
     /// Begins a frame, and with it a tick; whether memory was [short](Self::is_short) in the one before.
     pub fn begin_frame(&self) -> bool {
         let was_short = self.is_short();
-        let tick = self.sessions.load(Ordering::Relaxed).div_ceil(SESSIONS_PER_TICK)
-            % (BY_SQUARES / SESSIONS_PER_TICK);
-        self.sessions.store(tick * SESSIONS_PER_TICK, Ordering::Relaxed);
-        let is_calm = self.gone.swap(0, Ordering::Relaxed) == 0;
+        // Ticks never go back: what is used in an earlier one is not marked.
+        let next =
+            |sessions: u32| Some(sessions.wrapping_add(SESSIONS_PER_TICK - 1) & !(SESSIONS_PER_TICK - 1));
+        let _ = self.sessions.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next);
+        let tick = self.sessions.load(Ordering::Relaxed) / SESSIONS_PER_TICK;
+        let is_calm = self.is_calm();
+        self.gone.store(0, Ordering::Relaxed);
         self.frame_tick.store(if is_calm { tick } else { BY_SQUARES }, Ordering::Relaxed);
+        if is_before(self.words.eras.now().1, tick.wrapping_sub(ERA)) {
+            self.words.eras.begin(tick);
+        }
         if was_short {
             self.move_in();
         }
@@ -214,8 +226,14 @@ impl Blocks {
     pub(super) fn retire(&self, gone: u32) {
         add(&self.counters_of(gone).evictions, 1);
         self.gone.fetch_add(1, Ordering::Relaxed);
-        self.frame_tick.store(BY_SQUARES, Ordering::Relaxed);
+        if !self.is_calm() {
+            self.frame_tick.store(BY_SQUARES, Ordering::Relaxed);
+        }
         self.let_go(gone);
+        // What was seen before is looked at anew, and marked, so that others go next.
+        if self.words.eras.take_end() || self.frame_tick.load(Ordering::Relaxed) == BY_SQUARES {
+            self.words.eras.begin(self.tick());
+        }
     }
 
     /// Whether memory is short: more than a few blocks had to go. A few always have to, where a set is full before the
@@ -228,11 +246,21 @@ impl Blocks {
         self.gone.load(Ordering::Relaxed) as usize > self.limit / FEW
     }
 
+    /// Whether hardly any blocks had to go in this frame: one in so many of all that may be here, at most.
+    fn is_calm(&self) -> bool {
+        /// To give a page back and to get one for each of so few blocks is less than what it costs to find all of them by
+        /// a table.
+        const HARDLY_ANY: usize = 256;
+        self.gone.load(Ordering::Relaxed) as usize <= self.limit / HARDLY_ANY
+    }
+
     /// The same of a block that went for nothing that is needed: memory is not short for that. It has been
     /// [declared gone](Words::leave).
     pub fn let_go(&self, gone: u32) {
         // Before the epoch ends: who enters a later one knows it.
-        self.slots.leave_order(|| self.epochs.retire());
+        if !self.is_calm() {
+            self.slots.leave_order(|| self.epochs.retire());
+        }
         let mut retired = self.retired();
         self.whole.end();
         retired.push(self.epochs.retire(), gone);

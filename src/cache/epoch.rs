@@ -76,15 +76,12 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Enters the epoch of now, and says which is the present one then: nothing that is retired at that one or later
-    /// is freed before the reader leaves. (The one that it is in may be earlier, and what was retired at that one be
-    /// gone already.)
+    /// Enters the epoch of now: nothing that is retired from now on is freed before the reader leaves.
     #[inline]
-    pub fn enter(&self) -> u64 {
+    pub fn enter(&self) {
         let now = self.epochs.now.load(Ordering::SeqCst);
         self.epochs.slots[self.slot].store(now, Ordering::SeqCst);
         fence(Ordering::SeqCst);
-        self.epochs.now.load(Ordering::SeqCst)
     }
 
     /// Its number: no other reader that is there has the same.

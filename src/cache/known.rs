@@ -5,15 +5,15 @@
 //! time. So a thread keeps in mind which lists it has seen whole; and when it ends, with its frame, the next one goes on
 //! with what it knew.
 //!
-//! **How long that holds.** Whatever is given up moves the epoch on, before its memory can go (`epoch.rs`, 4). A list
-//! that was seen whole in a use that began in one epoch is whole in every use that begins in the same one, be it another
-//! thread's: what was given up since, if anything, was declared gone but not yet retired when that use began, and so is
-//! not freed before it ends.
+//! **How long that holds.** For an [era](super::eras), be it another thread's: until something goes that may be part of a
+//! list. What went since a use began, if anything, was not yet retired then, and so is not freed before the use ends. A
+//! list whose blocks had to come is not kept in mind before it is looked at again: who brings a block marks it with the
+//! tick in which he began to, and that may be before the era.
 //!
-//! **What policies know.** A list that is known is not marked as used again. Policies are asked only when something has
-//! to go, and from then on, in another epoch, every list is looked at anew: marks are at most as old as the last
-//! time that something went. So that what was seen long before is not taken for what is in view, an *era*
-//! ends in any case after [`TICKS`].
+//! **What policies know.** A list that is known is not marked as used again. As long as few blocks have to go, that is no
+//! matter: whenever one is chosen that was used in the era, all lists are looked at anew, and what is in view has marks
+//! of the present frame. Where many have to, an era begins with each tick: every list is looked at once in a tick, and
+//! marks are those that they would be if it always were.
 //!
 //! **How it is kept.** A line of the cache for the lists that begin in 448 words after one another, which are those of
 //! some forty neighbouring leaves, or eight pages. Each has one line that it may have, or else the one beside it:
@@ -27,6 +27,7 @@
 //!           +-----------------------------------------------------------------------+
 //! ```
 
+use super::eras::{Era, is_before};
 use std::cell::Cell;
 use std::ops::Range;
 
@@ -36,9 +37,6 @@ const LINES: Range<usize> = 128..1 << 16;
 /// One in so many bytes of the memory for blocks is for lines. (With a hundredth, a thread of a flight of which all was in
 /// memory knew too few lists to go by, and looked at the rest at each visit.)
 const SHARE: usize = 32;
-
-/// Ticks in an era: 1024 frames of 512 x 512. (With 64 frames, looking at lists anew took 2 to 3 % of them.)
-const TICKS: u32 = 1 << 14;
 
 const TICK_BITS: u32 = 8;
 const ERA_BITS: u32 = 16;
@@ -60,8 +58,8 @@ pub struct Known {
     lines: Box<[Line]>,
     /// From 1 to 2^16 - 1.
     era: Cell<u64>,
-    /// The epoch and the part of all ticks that the era is.
-    now: Cell<(u64, u32)>,
+    /// Which one that is of [all](super::eras).
+    now: Cell<Era>,
     /// First uses in a tick of lists that were known.
     uses: Cell<u64>,
 }
@@ -89,10 +87,9 @@ impl Known {
         lines * size_of::<Line>()
     }
 
-    /// A use begins, or goes on, in an epoch.
+    /// A use begins, or goes on, in an era.
     #[inline(always)]
-    pub fn begin(&self, epoch: u64, tick: u32) {
-        let now = (epoch, tick / TICKS);
+    pub fn begin(&self, now: Era) {
         if self.now.get() != now || self.era.get() == 0 {
             self.now.set(now);
             self.next_era();
@@ -128,8 +125,12 @@ impl Known {
         false
     }
 
-    /// Keeps in mind that it was.
+    /// Keeps in mind that it was, and that its words were marked with this tick or a later one. Does nothing if that is
+    /// before the era.
     pub fn add(&self, list: usize, tick: u32) {
+        if is_before(tick, self.now.get().1) {
+            return;
+        }
         let (place, now, bit) = self.find(list, tick);
         let (Some(first), Some(other)) = (self.lines.get(place), self.lines.get(place ^ 1)) else { return };
         let is_its = |line: &&Line| (line.tag.get() ^ now) >> TICK_BITS == 0;
@@ -173,27 +174,29 @@ mod tests {
 
     fn known() -> Known {
         let known = Known::new(128);
-        known.begin(0, 0);
+        known.begin((0, 0));
         known
     }
 
     #[test]
-    fn a_list_is_known_in_its_epoch_alone() {
+    fn a_list_is_known_in_its_era_alone() {
         let known = known();
         assert!(!known.has(0, 0));
         for list in (0..800).step_by(40) {
-            known.begin(7, 3);
+            known.begin((7, 3));
             known.add(list, 3);
             assert!(known.has(list, 3));
             assert!(!known.has(list + 1, 3) && !known.has(list + 40, 3));
             // What would have the same line and bit.
             assert!(!known.has(list + 128 * WORDS, 3));
-            known.begin(7, TICKS - 1);
-            assert!(known.has(list, TICKS - 1));
-            known.begin(8, 3);
-            assert!(!known.has(list, 3));
+            known.begin((7, 3));
+            assert!(known.has(list, 99));
+            for other in [(8, 3), (7, 4)] {
+                known.begin(other);
+                assert!(!known.has(list, 4), "{other:?}");
+            }
         }
-        known.begin(9, 3);
+        known.begin((9, 3));
         (0..60_000).filter(|list| list % 7 == 0).for_each(|list| known.add(list, 3));
         // Those that came last are there, each in its place, and the first ones had to go.
         let first = 60_000_usize.div_ceil(WORDS) - 128;
@@ -203,13 +206,14 @@ mod tests {
     }
 
     #[test]
-    fn an_era_ends_with_its_ticks() {
+    fn what_was_marked_before_an_era_is_not_known_in_it() {
         let known = known();
-        for (tick, is_known) in [(0, false), (TICKS - 1, true), (TICKS, false), (2 * TICKS - 1, true)] {
-            known.begin(0, tick);
-            assert_eq!(known.has(40, tick), is_known, "{tick}");
-            known.add(40, tick);
-        }
+        known.begin((0, 5));
+        known.add(40, 4);
+        assert!(!known.has(40, 5), "a block of it may go without a word");
+        known.add(80, 5);
+        known.add(120, 6);
+        assert!(known.has(80, 4) && known.has(120, 5), "whoever asks");
     }
 
     #[test]
@@ -218,7 +222,7 @@ mod tests {
         known.add(40, 0);
         known.add(47, 0);
         for tick in [0, 0, 1, 1, 2] {
-            known.begin(0, tick);
+            known.begin((0, 0));
             assert!(known.has(40, tick) && known.has(47, tick));
         }
         assert_eq!((known.take_uses(), known.take_uses()), (2, 0));
@@ -231,7 +235,7 @@ mod tests {
         known.era.set((1 << ERA_BITS) - 1);
         known.add(80, 0);
         assert!(known.has(80, 0));
-        known.begin(1, 0);
+        known.begin((1, 0));
         assert_eq!(known.era.get(), 1, "that of the first list");
         assert!(!known.has(40, 0) && !known.has(80, 0) && !known.has(0, 0));
     }
@@ -245,7 +249,7 @@ mod tests {
         assert!(known.has(lists[0], 3) && known.has(lists[1], 2), "one of them beside its line");
         known.add(lists[2], 4);
         assert_eq!(lists.map(|list| known.has(list, 4)), [true, false, true]);
-        known.begin(1, 4);
+        known.begin((1, 0));
         known.add(lists[1], 4);
         assert_eq!(lists.map(|list| known.has(list, 4)), [false, true, false]);
         known.add(lists[0], 4);
@@ -256,7 +260,7 @@ mod tests {
     fn who_has_no_lines_knows_nothing() {
         let known = Known::default();
         assert!(known.is_none());
-        known.begin(0, 0);
+        known.begin((0, 0));
         known.add(40, 0);
         assert!(!known.has(40, 0) && !known.has(0, 0));
     }

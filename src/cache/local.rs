@@ -104,8 +104,8 @@ impl Local {
     /// Goes on with a use that was [left](Self::leave).
     #[inline(always)]
     pub fn enter(&self) {
-        let epoch = self.reader.enter();
-        self.known.begin(epoch, self.blocks.tick());
+        self.reader.enter();
+        self.known.begin(self.blocks.words.eras.now());
     }
 
     /// Leaves the epoch in the middle of a use, to wait for something.

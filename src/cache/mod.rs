@@ -27,6 +27,7 @@
 //! | `slots` | memory for blocks that are here, and which of it is whose |
 //! | `words` | a word for each block: here? used when, how often? |
 //! | `epoch`, `retired` | who still reads, so that memory is not freed under him, and what waits for that |
+//! | `eras` | how long what a thread has seen holds |
 //! | `directory`, `policy/` | sets of blocks behind striped locks, and which block makes room |
 //! | `deadline` | when threads stop waiting |
 //! | `quota`, `gate` | how many blocks may be pinned, how many threads be at work |
@@ -54,6 +55,7 @@ mod blocks;
 mod deadline;
 mod directory;
 mod epoch;
+mod eras;
 mod file;
 mod gate;
 mod gather;

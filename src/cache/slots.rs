@@ -1,9 +1,9 @@
 //! Places in memory for the blocks that are here.
 //!
-//! As long as nothing has had to go, a block comes to its *home*: homes follow one another as blocks do, and whoever knows
+//! As long as hardly anything has had to go, a block comes to its *home*: homes follow one another as blocks do, and whoever knows
 //! a block's number knows where it lies. Homes have addresses for all of a scene, and memory for what is here.
 //!
-//! From when the first block has to go, blocks that come have *slots* instead, as many as the budget allows, in a stretch of
+//! From when many blocks have to go, those that come have *slots* instead, as many as the budget allows, in a stretch of
 //! their own; a table says which. So memory that one block has left is the next one's without a word to the system, the
 //! stretch can lie in large pages, and a block may be smaller than a page of the system (a ray that hits something smaller
 //! than a pixel uses a few hundred bytes of a page; such small blocks have slots from the beginning).
@@ -50,7 +50,7 @@ pub struct Slots {
 enum Homes {
     /// None.
     Never,
-    /// Those that come before one has had to go.
+    /// Those that come before many have had to go.
     AtFirst,
     /// All: there is room for all.
     Always,
@@ -254,8 +254,8 @@ impl Slots {
         }
     }
 
-    /// Gives up the order, where there is one and it is not for ever. To be called before a block is retired; `retire`
-    /// [ends the epoch](super::epoch::Epochs::retire).
+    /// Gives up the order, where there is one and it is not for ever; `retire` [ends the epoch](
+    /// super::epoch::Epochs::retire).
     pub fn leave_order(&self, retire: impl FnOnce() -> u64) {
         if self.homes == Homes::AtFirst && self.are_in_order() {
             let mut state = self.state();

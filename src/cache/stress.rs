@@ -5,6 +5,7 @@ use super::layout::{Array, Layout};
 use super::plan::{CacheOptions, Loading, Plan, Prefetch};
 use super::policy::Replacement;
 use super::source::Source;
+use super::words::Notes;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
@@ -224,4 +225,139 @@ fn homes_that_wait_to_be_left_are_nobody_s_before() {
     assert!(blocks.reclaim(), "its first home goes now");
     // SAFETY: it is here, and nobody else is.
     assert_eq!(unsafe { *blocks.slots.at(7).cast::<u32>() }, 8);
+}
+
+/// Threads that keep in mind which pairs of blocks they have seen, while others drive these out and frames and ticks go on.
+fn stress_known(policy: Replacement, loading: Loading, prefetch: Prefetch) {
+    const BLOCKS: usize = 60;
+    const THREADS: usize = 4;
+    let layout = Layout::new([0, 0, 0, BLOCKS * BLOCK, 0, 0], BLOCK);
+    let options =
+        CacheOptions { block: BLOCK, ways: 4, policy, loading, prefetch, ..CacheOptions::default() };
+    let plan = Plan::new(&options, Plan::least(&options, 2) + 20, 2, THREADS, THREADS).expect("enough");
+    let (blocks, loaders) =
+        Blocks::new(layout, Box::new(Numbered), &options, &plan, THREADS).expect("starts");
+    let times_known = AtomicU32::new(0);
+    thread::scope(|scope| {
+        for number in 0..THREADS {
+            let (blocks, loaders, times_known) = (&blocks, &loaders, &times_known);
+            scope.spawn(move || {
+                let reader = blocks.epochs.reader().expect("there is room");
+                let (notes, mut state) = (Notes::default(), number as u64 * 7919 + 1);
+                let mut known = blocks.knowledge();
+                for round in 0..6000 {
+                    state =
+                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    // Mostly one of a few.
+                    let first = (state >> 33) as usize % if round % 8 == 0 { BLOCKS } else { 8 };
+                    let list = [first as u32, ((first * 7 + 3) % BLOCKS) as u32];
+                    let enter = || {
+                        reader.enter();
+                        known.begin(blocks.words.eras.now());
+                    };
+                    enter();
+                    let tick = blocks.tick();
+                    if known.has(first * 10, tick) {
+                        times_known.fetch_add(1, Ordering::Relaxed);
+                    } else {
+                        let uses = list.map(|block| blocks.words.use_in(block as usize, tick, &notes));
+                        if uses == [true; 2] {
+                            known.add(first * 10, tick);
+                        } else {
+                            reader.leave();
+                            let gathered =
+                                blocks.gather(loaders, &list, || ()).expect("there is no deadline");
+                            enter();
+                            drop(gathered);
+                        }
+                    }
+                    for _ in 0..2 {
+                        for block in list {
+                            // SAFETY: it was here when the epoch was entered, which goes on.
+                            let words: &[u8; BLOCK] = unsafe { &*blocks.slots.at(block as usize).cast() };
+                            let is_it = words
+                                .as_chunks::<4>()
+                                .0
+                                .iter()
+                                .all(|word| *word == (block + 1).to_le_bytes());
+                            assert!(is_it, "{block} is another's");
+                        }
+                        thread::yield_now();
+                    }
+                    reader.leave();
+                    blocks.words.hand_over(&notes, known.take_uses(), number);
+                    blocks.sessions.fetch_add(1, Ordering::Relaxed);
+                    if round % 300 == 0 {
+                        blocks.begin_frame();
+                        // Another thread goes on with what this one knew.
+                        blocks.pass_on(known);
+                        known = blocks.knowledge();
+                    }
+                }
+            });
+        }
+    });
+    assert!(times_known.into_inner() > 100 && blocks.take_stats().evictions > 100, "the test tests nothing");
+}
+
+#[test]
+fn lists_that_are_known_are_here() {
+    for policy in Replacement::ALL {
+        stress_known(policy, Loading::Synchronous, Prefetch::Off);
+        for prefetch in [Prefetch::Beside, Prefetch::Ahead] {
+            stress_known(policy, Loading::Asynchronous { loaders: 3 }, prefetch);
+        }
+    }
+}
+
+#[test]
+fn what_others_give_up_is_looked_at_anew_and_what_nobody_uses_goes_unnoticed() {
+    const LIST: usize = 40;
+    let options = CacheOptions {
+        block: BLOCK,
+        ways: 64,
+        policy: Replacement::Lru,
+        loading: Loading::Synchronous,
+        prefetch: Prefetch::Off,
+        ..CacheOptions::default()
+    };
+    let plan = Plan::new(&options, 40, 3, 1, 1).expect("enough");
+    let layout = Layout::new([0, 0, 0, 60 * BLOCK, 0, 0], BLOCK);
+    let (blocks, loaders) = Blocks::new(layout, Box::new(Numbered), &options, &plan, 1).expect("starts");
+    let bring = |block: u32| drop(blocks.gather(&loaders, &[block], || ()).expect("there is no deadline"));
+    let evictions = || blocks.take_stats().evictions;
+    let next_tick = || {
+        let tick = blocks.tick();
+        while blocks.tick() == tick {
+            blocks.sessions.fetch_add(1, Ordering::Relaxed);
+        }
+    };
+    (0..40).for_each(bring);
+    assert!(evictions() > 0);
+    let (known, reader) = (blocks.knowledge(), blocks.epochs.reader().expect("there is room"));
+    // Whether a list of block 39 is known; it is from then on.
+    let visit = || {
+        reader.enter();
+        known.begin(blocks.words.eras.now());
+        let is_known = known.has(LIST, blocks.tick());
+        assert!(is_known || blocks.words.use_in(39, blocks.tick(), &Notes::default()));
+        known.add(LIST, blocks.tick());
+        reader.leave();
+        is_known
+    };
+    next_tick();
+    bring(40);
+    assert!(!visit() && visit());
+    bring(41);
+    bring(42);
+    assert!(visit(), "what went was used before this tick");
+    next_tick();
+    assert!(visit(), "nothing went");
+    bring(43);
+    assert!(!visit() && visit(), "policies know what is in view of each tick in which something goes");
+    assert_eq!(evictions(), 4);
+    // Somebody else gives it up, and it comes again.
+    blocks.clear();
+    bring(39);
+    assert!(!visit() && visit());
 }

@@ -217,17 +217,16 @@ impl<'a> View<'a> {
         }
         self.forget_copies();
         let (known, name) = (self.local().known(), part.base / size_of::<u32>() + list.start);
-        if !known.has(name, self.tick) {
-            self.look_at_list(part, list);
-            // By now it is whole, and the era may be another.
+        // If blocks had to come, they may bear an earlier tick: it is known the next time.
+        if !known.has(name, self.tick) && self.look_at_list(part, list) {
             known.add(name, self.tick);
         }
     }
 
-    /// The same, word by word.
+    /// The same, word by word; whether all was here, and is marked now.
     #[cold]
     #[inline(never)]
-    fn look_at_list(&self, part: &Part<u32>, list: Range<usize>) {
+    fn look_at_list(&self, part: &Part<u32>, list: Range<usize>) -> bool {
         let mut here = self.use_all(part.blocks(list.clone(), self.shift));
         if here {
             let mut last = 0..0;
@@ -246,6 +245,7 @@ impl<'a> View<'a> {
         if !here {
             self.gather_list(part, list);
         }
+        here
     }
 
     /// The same, where something is missing.

@@ -12,6 +12,7 @@
 //! To see that a block is here is one load. A use writes only if the block was not used in this tick before, or not at
 //! all.
 
+use super::eras::{Eras, TICKS, is_before};
 use super::policy::Use;
 use super::stats::PARTS;
 use super::sync::{AtomicBool, AtomicU32, AtomicU64, Mutex, MutexGuard, Ordering, PoisonError};
@@ -23,6 +24,7 @@ const COUNT: u32 = 0x7f << 24;
 const ONE: u32 = 1 << 24;
 const UNUSED: u32 = 1 << 23;
 const TICK: u32 = UNUSED - 1;
+const _: () = assert!(TICK == TICKS - 1);
 
 /// Counters of uses.
 const COUNTERS: usize = 16;
@@ -43,6 +45,8 @@ pub struct Words {
     first_of_leaves: usize,
     /// Blocks that came ahead of need: those that were used afterwards, and those that went unused.
     ahead: CachePadded<[AtomicU64; 2]>,
+    /// How long it holds that a thread has seen something.
+    pub eras: CachePadded<Eras>,
 }
 
 /// First uses in a tick that one thread has made and not yet [handed over](Words::hand_over): a square's, or a query's. To
@@ -71,6 +75,7 @@ impl Words {
             uses: Default::default(),
             first_of_leaves,
             ahead: CachePadded::default(),
+            eras: CachePadded::default(),
         }
     }
 
@@ -96,13 +101,18 @@ impl Words {
         was_used(self.words[block].load(Ordering::Acquire), tick)
     }
 
-    /// Takes note of the first use in a tick.
+    /// Takes note of the first use in a tick. A use in an earlier tick than the last one was is the same use.
     #[inline(never)]
     fn mark(&self, block: usize, mut word: u32, tick: u32, notes: &Notes) -> bool {
         // An exchange, so that a block that goes meanwhile is not called back.
         while word & HERE != 0 {
+            let is_past = is_before(tick, word);
+            if is_past && word & UNUSED == 0 {
+                return true;
+            }
             let count = if word & COUNT == COUNT { COUNT } else { (word & COUNT) + ONE };
-            let new = HERE | count | (tick & TICK);
+            // Ticks only go forward: eras rely on it.
+            let new = HERE | count | (if is_past { word } else { tick } & TICK);
             match self.words[block].compare_exchange_weak(word, new, Ordering::AcqRel, Ordering::Acquire) {
                 Ok(_) => {
                     self.count_ahead(word, 0);
@@ -246,6 +256,9 @@ impl Words {
     pub fn leave(&self, block: usize) {
         let word = self.words[block].swap(0, Ordering::SeqCst);
         self.count_ahead(word, 1);
+        if word & UNUSED == 0 {
+            self.eras.gone(word & TICK);
+        }
     }
 
     /// The same of a block that came ahead of need, unless somebody has used it; whether it has left.
@@ -374,6 +387,36 @@ mod tests {
         assert_eq!(words.uses(1), Use { tick: 0, count: 1 });
         (0..5).for_each(|block| words.leave(block));
         assert_eq!(words.take_ahead(), [0, 0]);
+    }
+
+    #[test]
+    fn ticks_go_forward_as_long_as_a_block_is_here() {
+        let words = words(1);
+        words.arrive(0, 7);
+        for (tick, last) in [(6, 7), (7, 7), (9, 9), (8, 9), (TICK, 9), (9, 9)] {
+            assert!(use_in(&words, 0, tick));
+            assert_eq!(words.uses(0).tick, last, "{tick}");
+        }
+        assert_eq!((words.uses(0).count, take_uses(&words)), (2, 2));
+    }
+
+    #[test]
+    fn what_goes_ends_what_was_seen_of_it() {
+        let words = words(3);
+        words.eras.begin(5);
+        words.arrive(0, 4);
+        words.arrive(1, 4);
+        words.arrive_ahead(2, 6);
+        let era = words.eras.now();
+        words.leave(0);
+        assert_eq!(words.eras.now(), era, "not since the era began");
+        words.leave(2);
+        words.arrive_ahead(2, 6);
+        assert!(words.leave_unused(2));
+        assert_eq!(words.eras.now(), era, "never");
+        assert!(use_in(&words, 1, 5));
+        words.leave(1);
+        assert_ne!(words.eras.now(), era);
     }
 
     #[test]

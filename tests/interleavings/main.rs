@@ -22,6 +22,8 @@ mod deadline;
 mod directory;
 #[path = "../../src/cache/epoch.rs"]
 mod epoch;
+#[path = "../../src/cache/eras.rs"]
+mod eras;
 #[path = "../../src/cache/gate.rs"]
 mod gate;
 #[path = "../../src/cache/gather.rs"]

@@ -12,7 +12,8 @@ use crate::plan::{CacheOptions, Loading, Plan, Prefetch};
 use crate::policy::Replacement;
 use crate::quota::Quota;
 use crate::source::Source;
-use crate::sync::{Arc, AtomicBool, AtomicUsize, Mutex, Ordering, thread};
+use crate::sync::{Arc, AtomicBool, AtomicU32, AtomicUsize, Mutex, Ordering, thread};
+use crate::words::{Notes, Words};
 use std::io;
 use std::time::Instant;
 
@@ -378,38 +379,34 @@ pub fn a_deadline() {
     leaves_nothing(&blocks);
 }
 
-pub fn epochs_hold() {
-    goes_while_it_is_read(false);
-}
-
-pub fn known_lists_hold() {
-    goes_while_it_is_read(true);
-}
-
 /// What readers keep in mind.
 const LIST: usize = 1;
 
-/// Something that is there, declared gone, retired and freed, and two readers that may have found it; they may keep
-/// in mind what they saw, and then whoever reads next does.
-fn goes_while_it_is_read(keep_in_mind: bool) {
-    let epochs = Epochs::new(4);
-    let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
+/// A list of one block that is used in one tick and the next, and goes, twice: readers keep in mind what they saw, and
+/// whoever reads next does. Eras begin anew now and then.
+pub fn known_lists_hold() {
+    let (epochs, words) = (Epochs::new(4), Arc::new(Words::new(1, 0)));
+    let (tick, freed) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
     let all_known = Arc::new(Mutex::new(vec![Known::new(128), Known::new(128)]));
+    words.arrive(0, 0);
     let readers: Vec<_> = (0..2)
         .map(|_| {
-            let (reader, all_known, here, freed) = (
-                epochs.reader().expect("room"),
-                Arc::clone(&all_known),
-                Arc::clone(&here),
-                Arc::clone(&freed),
-            );
+            let reader = epochs.reader().expect("room");
+            let (words, tick) = (Arc::clone(&words), Arc::clone(&tick));
+            let (all_known, freed) = (Arc::clone(&all_known), Arc::clone(&freed));
             thread::spawn(move || {
-                for _ in 0..2 + usize::from(keep_in_mind) {
+                let mut old = 0;
+                for round in 0..4 {
                     let known = all_known.lock().expect("no panic").pop().expect("one for each reader");
-                    known.begin(reader.enter(), 0);
-                    if known.has(LIST, 0) || here.load(Ordering::SeqCst) {
-                        if keep_in_mind {
-                            known.add(LIST, 0);
+                    reader.enter();
+                    known.begin(words.eras.now());
+                    // A view has the tick with which it was made, however long it goes on.
+                    let now = if round == 2 { old } else { tick.load(Ordering::Relaxed) };
+                    old = now;
+                    let is_known = known.has(LIST, now);
+                    if is_known || words.use_in(0, now, &Notes::default()) {
+                        if !is_known {
+                            known.add(LIST, now);
                         }
                         assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
                         thread::yield_now();
@@ -417,6 +414,46 @@ fn goes_while_it_is_read(keep_in_mind: bool) {
                     }
                     reader.leave();
                     all_known.lock().expect("no panic").push(known);
+                }
+            })
+        })
+        .collect();
+    for round in 1..3 {
+        tick.store(round, Ordering::Relaxed);
+        words.eras.begin(round);
+        thread::yield_now();
+        words.leave(0);
+        let retired = epochs.retire();
+        while epochs.earliest() <= retired {
+            thread::yield_now();
+        }
+        freed.store(true, Ordering::SeqCst);
+        thread::yield_now();
+        if round == 1 {
+            freed.store(false, Ordering::SeqCst);
+            words.arrive(0, round);
+        }
+    }
+    readers.into_iter().for_each(|reader| reader.join().expect("no panic"));
+}
+
+/// Something that is there, declared gone, retired and freed, and two readers that may have found it.
+pub fn epochs_hold() {
+    let epochs = Epochs::new(4);
+    let (here, freed) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
+    let readers: Vec<_> = (0..2)
+        .map(|_| {
+            let reader = epochs.reader().expect("room");
+            let (here, freed) = (Arc::clone(&here), Arc::clone(&freed));
+            thread::spawn(move || {
+                for _ in 0..2 {
+                    reader.enter();
+                    if here.load(Ordering::SeqCst) {
+                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
+                        thread::yield_now();
+                        assert!(!freed.load(Ordering::SeqCst), "freed while it is read");
+                    }
+                    reader.leave();
                 }
             })
         })
