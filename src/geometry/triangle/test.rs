@@ -72,6 +72,13 @@ pub trait Alone: Test<1, f32> {
     /// [`test`](Test::test) says so, and few others.
     fn sift<S: Simd>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> u32;
 
+    /// The same of four.
+    #[inline(always)]
+    fn sift_four<S: Simd>(&self, triangles: &[&Self::Record; 4], tnear: f32, tfar: f32) -> u32 {
+        let [a, b, c, d] = *triangles;
+        self.sift::<S>(&[a, b, c, d, a, b, c, d], tnear, tfar) & 0xf
+    }
+
     /// Eight rays, each against a triangle of its own: what [`test`](Test::test) finds, to the bit, or leaves to it.
     #[inline(always)]
     fn test_eight<L: Eight>(_rays: &[&Self; 8], _triangles: &[&Self::Record; 8]) -> Finds {

@@ -45,8 +45,14 @@ impl Leaf {
         self.left > 8
     }
 
-    /// Fetches the next eight triangles: others of the same leaf if some are left, or else the first ones of the leaf
-    /// whose record begins at `record` in `words`.
+    /// Whether there are more than four.
+    #[inline(always)]
+    pub fn is_more_than_four(&self) -> bool {
+        self.left > 4
+    }
+
+    /// Takes up the next eight triangles: others of the same leaf if some are left, or else the first ones of the leaf
+    /// whose record begins at `record` in `words`. Fetches the first four of them.
     #[inline(always)]
     pub fn fetch<L: Eight, R>(&mut self, words: &[u32], record: usize, records: &[R]) {
         let goes_on = self.goes_on();
@@ -57,15 +63,38 @@ impl Leaf {
         let ids = L::ids_load(bytemuck::cast_ref::<[u32; 8], [i32; 8]>(words));
         let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
         self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
-        for primitive in self.primitives {
-            let record = records.as_ptr().wrapping_add(primitive as usize);
-            prefetch(record);
-            prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
-        }
+        fetch_four(self.primitives.first_chunk().expect("four of eight"), records);
+    }
+
+    /// Fetches the other four.
+    #[inline(always)]
+    pub fn fetch_others<R>(&self, records: &[R]) {
+        fetch_four(self.primitives.last_chunk().expect("four of eight"), records);
+    }
+}
+
+/// Fetches four triangles.
+#[inline(always)]
+fn fetch_four<R>(primitives: &[i32; 4], records: &[R]) {
+    for &primitive in primitives {
+        let record = records.as_ptr().wrapping_add(primitive as usize);
+        prefetch(record);
+        prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
     }
 }
 
 impl<A: Alone> Flight<A> {
+    /// Sifts the triangles that were fetched, of which there are four at most.
+    #[inline(always)]
+    pub fn sift_four<S: Simd>(&mut self, records: &[A::Record]) {
+        let mut triangles = [&records[0]; 4];
+        for lane in 0..4 {
+            triangles[lane] = &records[self.leaf.primitives[lane] as usize];
+        }
+        let lanes = (1 << self.leaf.left.min(4)) - 1;
+        self.leaf.open = self.test.sift_four::<S>(&triangles, self.tnear, self.tfar) & lanes;
+    }
+
     /// Sifts the eight triangles that were fetched.
     #[inline(always)]
     pub fn sift<S: Simd>(&mut self, records: &[A::Record]) {

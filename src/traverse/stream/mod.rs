@@ -2,8 +2,8 @@
 //!
 //! Incoherent rays have nothing to share, and one by one they spend their time waiting for memory and on
 //! branches that nobody can foresee. Here some thirty rays are on their way at once. Each round does one
-//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or eight triangles of a leaf
-//! ([`leaf`]). Rays that need the same work stand in one set, so that no branch depends on what a ray meets; and what
+//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or up to four or eight triangles of a
+//! leaf ([`leaf`]). Rays that need the same work stand in one set, so that no branch depends on what a ray meets; and what
 //! a ray needs in its next round is fetched while the others have theirs.
 //!
 //! ```text
@@ -167,6 +167,23 @@ impl Ways {
         let record = tree.references().as_ptr().wrapping_add(exit.record());
         prefetch(select_unpredictable(exit.is_leaf(), record, line));
     }
+
+    /// Sends a ray on that has sifted its triangles: to be tested, or if nothing is left of them, to the next ones of its
+    /// leaf, or if that was all, to what is next on its stack.
+    #[inline(always)]
+    fn go_on<A>(
+        &mut self,
+        tree: &KdTree,
+        number: usize,
+        flight: &mut Flight<A>,
+        waiting: &Waiting,
+        hits: &mut Set,
+    ) {
+        let (found, goes_on) = (flight.leaf.is_open(), flight.leaf.goes_on());
+        hits.put_if(number, found);
+        flight.top -= u32::from(!found & !goes_on);
+        self.route(tree, number, waiting.exits[flight.top as usize], !found);
+    }
 }
 
 thread_local! {
@@ -199,7 +216,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
     let mut ways = Ways { lines: Set::NONE, leaves: Set::NONE, ended: Set::NONE };
-    let (mut triangles, mut hits) = (Set::NONE, Set::NONE);
+    let (mut fours, mut eights, mut hits) = (Set::NONE, Set::NONE, Set::NONE);
     let mut free = Set::ALL;
     let mut ahead = 0;
     let mut group = Group::new();
@@ -234,15 +251,14 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             return;
         };
 
-        // Triangles. Where nothing is found, a ray goes on with the next ones of its leaf, or if that was all, with what
-        // is next on its stack.
-        while let Some(k) = triangles.pop() {
-            let (flight, waiting) = (&mut flights[k], &stacks[k]);
-            flight.sift::<S>(records);
-            let (found, goes_on) = (flight.leaf.is_open(), flight.leaf.goes_on());
-            hits.put_if(k, found);
-            flight.top -= u32::from(!found & !goes_on);
-            ways.route(tree, k, waiting.exits[flight.top as usize], !found);
+        // Triangles, four or eight.
+        while let Some(k) = fours.pop() {
+            flights[k].sift_four::<S>(records);
+            ways.go_on(tree, k, &mut flights[k], &stacks[k], &mut hits);
+        }
+        while let Some(k) = eights.pop() {
+            flights[k].sift::<S>(records);
+            ways.go_on(tree, k, &mut flights[k], &stacks[k], &mut hits);
         }
 
         // Hits.
@@ -278,7 +294,12 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             let flight = &mut flights[k];
             let exit = Exit(stacks[k].exits[flight.top as usize]);
             flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
-            triangles.put_if(k, true);
+            fours.put_if(k, !flight.leaf.is_more_than_four());
+            eights.put_if(k, flight.leaf.is_more_than_four());
+        }
+        let mut longer = eights;
+        while let Some(k) = longer.pop() {
+            flights[k].leaf.fetch_others(records);
         }
 
         // Lines. Those who go on with a line are there again in the next round.

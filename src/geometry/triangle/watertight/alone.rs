@@ -35,9 +35,9 @@ impl Shear<1, f32> {
         [i.min(2), j.min(2), k.min(2)]
     }
 
-    /// Sifts four triangles.
+    /// What tells of four triangles whether they may be hit.
     #[inline(always)]
-    fn sift_four<L: Sixteen>(&self, triangles: [&Triangle; 4], tnear: f32, tfar: f32) -> Signs {
+    fn signs<L: Sixteen>(&self, triangles: [&Triangle; 4], tnear: f32, tfar: f32) -> Signs {
         let [i, j, k] = self.axes();
         let [a, b, c, d] =
             [triangles[0].rows(), triangles[1].rows(), triangles[2].rows(), triangles[3].rows()];
@@ -89,19 +89,29 @@ impl Alone for Shear<1, f32> {
     #[inline(always)]
     fn sift<S: Simd>(&self, triangles: &[&Triangle; 8], tnear: f32, tfar: f32) -> u32 {
         let [a, b, c, d, e, f, g, h] = *triangles;
-        let low = self.sift_four::<S::F16>([a, b, c, d], tnear, tfar);
-        let high = self.sift_four::<S::F16>([e, f, g, h], tnear, tfar);
-        let signs = |i: usize| (low[i] & 0xffff) | high[i] << 16;
-        let [negative, positive, begun, left] = [signs(0), signs(1), signs(2), signs(3)];
-        // Zeros are of either sign, as the test may find them to be.
-        let is_outside = of_any_corner(negative) & of_any_corner(positive);
-        first_of_fours(of_any_corner(begun) & of_any_corner(left) & !is_outside)
+        let low = self.signs::<S::F16>([a, b, c, d], tnear, tfar);
+        let high = self.signs::<S::F16>([e, f, g, h], tnear, tfar);
+        let both = |i: usize| (low[i] & 0xffff) | high[i] << 16;
+        first_of_fours(may_be_hit([both(0), both(1), both(2), both(3)]))
+    }
+
+    #[inline(always)]
+    fn sift_four<S: Simd>(&self, triangles: &[&Triangle; 4], tnear: f32, tfar: f32) -> u32 {
+        first_of_fours(may_be_hit(self.signs::<S::F16>(*triangles, tnear, tfar)) & 0xffff)
     }
 
     #[inline(always)]
     fn test_eight<L: Eight>(rays: &[&Self; 8], triangles: &[&Triangle; 8]) -> Finds {
         pairs::test::<L>(rays, triangles)
     }
+}
+
+/// In bit 0 of each four bits: whether that triangle may be hit. Zeros are of either sign, as the test may find them to
+/// be.
+#[inline(always)]
+const fn may_be_hit([negative, positive, begun, left]: Signs) -> u32 {
+    let is_outside = of_any_corner(negative) & of_any_corner(positive);
+    of_any_corner(begun) & of_any_corner(left) & !is_outside
 }
 
 /// In bit 0 of each four bits: whether any of the first three is set.
@@ -134,6 +144,9 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self) -> [u32; 2] {
             let Self(ray, triangles, [tnear, tfar]) = self;
+            let (first, last) = (triangles.first_chunk().unwrap(), triangles.last_chunk().unwrap());
+            let fours = ray.sift_four::<S>(first, tnear, tfar) | ray.sift_four::<S>(last, tnear, tfar) << 4;
+            assert_eq!(fours, ray.sift::<S>(triangles, tnear, tfar), "four by four");
             [ray.sift::<S>(triangles, tnear, tfar), ray.likely_of_eight::<S::F8>(triangles) & 0xff]
         }
     }
