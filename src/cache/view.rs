@@ -339,17 +339,17 @@ impl<'a> View<'a> {
 
     /// A triangle's corners, entered. Panics if there is no such triangle.
     #[inline(always)]
-    pub fn corners_of(&self, primitive: u32) -> Corners {
+    pub fn corners_of(&self, primitive: u32) -> &Corners {
         let primitive = primitive as usize;
         assert!(primitive < self.triangles.count, "there are {} triangles", self.triangles.count);
         if self.is_whole {
             // SAFETY: as in `slice`: all blocks are here, at their homes.
-            return unsafe { (*self.triangles.place(primitive).cast::<Triangle>()).corners() };
+            return unsafe { &(*self.triangles.place(primitive).cast::<Triangle>()).corners };
         }
         self.forget_copies();
         // SAFETY: as in `slice`.
         let [triangle]: &[Triangle; 1] = unsafe { &*self.enter_elements(&self.triangles, primitive) };
-        triangle.corners()
+        &triangle.corners
     }
 
     /// Some bytes of the colours or the surfaces, entered and copied. Panics if they are out of range, or of another

@@ -66,8 +66,8 @@ pub trait Tree {
     fn triangle(&self, primitive: u32) -> &Triangle;
     /// A triangle's corners.
     #[inline(always)]
-    fn corners(&self, primitive: u32) -> Corners {
-        self.triangle(primitive).corners()
+    fn corners(&self, primitive: u32) -> &Corners {
+        &self.triangle(primitive).corners
     }
 
     /// Said before a walk looks at a leaf's triangles. A tree that is not all in memory gets them now; what it has
@@ -231,10 +231,7 @@ fn gather(mesh: &Mesh) -> Result<(Vec<Triangle>, Aabb, Scale)> {
     let bounds = if scale.is_none() {
         bounds
     } else {
-        triangles
-            .par_iter()
-            .map(|triangle| bounds_of(&triangle.corners()))
-            .reduce(|| Aabb::EMPTY, Aabb::union)
+        triangles.par_iter().map(|triangle| bounds_of(&triangle.corners)).reduce(|| Aabb::EMPTY, Aabb::union)
     };
     Ok((triangles, bounds, scale))
 }

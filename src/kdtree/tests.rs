@@ -96,7 +96,7 @@ fn strays(tree: &KdTree) -> usize {
             continue;
         }
         for &primitive in tree.primitives(node) {
-            let mut piece = Polygon::new(&tree.corners(primitive));
+            let mut piece = Polygon::new(tree.corners(primitive));
             for axis in 0..3 {
                 piece.clip(axis, cell.min[axis], false);
                 piece.clip(axis, cell.max[axis], true);

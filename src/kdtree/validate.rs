@@ -25,7 +25,7 @@ impl KdTree {
             let corners = self.corners(primitive);
             let extended =
                 [0, 1, 2].map(|axis| corners.iter().any(|corner| corner[axis] != corners[0][axis]));
-            if !self.covers(primitive, extended, self.root(), &self.bounds, &Polygon::new(&corners)) {
+            if !self.covers(primitive, extended, self.root(), &self.bounds, &Polygon::new(corners)) {
                 return Err(format!("triangle {primitive} is missing from a leaf that it overlaps"));
             }
         }

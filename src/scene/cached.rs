@@ -67,7 +67,7 @@ impl CachedSurface {
     fn corners_in(&self, view: &View<'_>, primitive: u32) -> [Vec3; 3] {
         let corners = view.corners_of(primitive);
         let scale = self.cached.scale();
-        if scale.is_none() { corners } else { scale.undo(&corners) }.map(Vec3::from_array)
+        if scale.is_none() { *corners } else { scale.undo(corners) }.map(Vec3::from_array)
     }
 
     #[inline(always)]

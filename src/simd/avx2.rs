@@ -6,7 +6,7 @@
 //! `#[target_feature]` entries of `isa.rs`, which a [`super::Chosen`] reaches only after the
 //! machine has been asked. So wherever a method of these types runs, the machine has AVX2.
 
-use super::eight::{Eight, LANES_OF, TURNED};
+use super::eight::{Eight, LANES_OF};
 use super::lanes::{Lanes, Mask, Simd};
 use super::pair::Pair;
 use std::arch::x86_64::*;
@@ -204,10 +204,6 @@ impl Eight for F32x8 {
     #[inline(always)]
     fn pick_in_fours(self, ids: __m256i) -> Self {
         Self(avx!(_mm256_permutevar_ps(self.0, ids)))
-    }
-    #[inline(always)]
-    fn turn_threes(self) -> Self {
-        Self(avx!(_mm256_permute_ps::<{ TURNED }>(self.0)))
     }
     #[inline(always)]
     fn pick(self, ids: __m256i) -> Self {

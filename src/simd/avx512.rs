@@ -5,7 +5,6 @@
 //! the `#[target_feature]` entry that a [`super::Chosen`] reaches after the machine was asked.
 
 use super::avx2;
-use super::eight::TURNED;
 use super::lanes::{Lanes, Mask, Simd};
 use super::sixteen::Sixteen;
 use std::arch::x86_64::*;
@@ -242,13 +241,5 @@ impl Sixteen for F32x16 {
             Self(avx512!(_mm512_shuffle_ps::<0x44>(high_ab, high_cd))),
             Self(avx512!(_mm512_shuffle_ps::<0xee>(high_ab, high_cd))),
         ]
-    }
-    #[inline(always)]
-    fn side_by_side(fours: [&[f32; 4]; 4]) -> Self {
-        Self(side_by_side(fours))
-    }
-    #[inline(always)]
-    fn turn_threes(self) -> Self {
-        Self(avx512!(_mm512_permute_ps::<{ TURNED }>(self.0)))
     }
 }

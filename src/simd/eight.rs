@@ -6,9 +6,6 @@
 
 use super::lanes::Lanes;
 
-/// Lanes 1, 2, 0 and 3 of each four, as instructions name them ([`Eight::turn_threes`]).
-pub(super) const TURNED: i32 = 0b11_00_10_01;
-
 /// Eight lanes whose values can change places. A *four* is a half: lanes 0 to 3, or 4 to 7.
 pub trait Eight: Lanes<8> {
     /// `fours[0]` in the lower half, `fours[1]` in the upper.
@@ -29,13 +26,6 @@ pub trait Eight: Lanes<8> {
             picked[lane] = values[lane & 4 | (ids[lane] & 3) as usize];
         }
         Self::load(&picked)
-    }
-
-    /// The first three lanes of each half in turn: what was lane 1 comes first, then 2, then 0. The last one stays.
-    #[inline(always)]
-    fn turn_threes(self) -> Self {
-        let [a, b, c, d, e, f, g, h] = self.store();
-        Self::load(&[b, c, a, d, f, g, e, h])
     }
 
     /// Lane `i` becomes lane `ids[i] & 7`.

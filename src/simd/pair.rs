@@ -154,14 +154,6 @@ impl<L: Eight> Sixteen for Pair<L> {
         let [e, f, g, h] = half_of_fours::<L>(fours, 8);
         [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
     }
-    #[inline(always)]
-    fn side_by_side([a, b, c, d]: [&[f32; 4]; 4]) -> Self {
-        Self(L::of_fours([a, b]), L::of_fours([c, d]))
-    }
-    #[inline(always)]
-    fn turn_threes(self) -> Self {
-        Self(self.0.turn_threes(), self.1.turn_threes())
-    }
 }
 
 /// [`Sixteen::of_fours`] of the eight from `first` on.

@@ -16,29 +16,6 @@ pub trait Sixteen: Lanes<16> {
         [Self::load(&columns[0]), Self::load(&columns[1]), Self::load(&columns[2]), Self::load(&columns[3])]
     }
 
-    /// Four fours side by side.
-    #[inline(always)]
-    fn side_by_side(fours: [&[f32; 4]; 4]) -> Self {
-        let mut values = [0.0; 16];
-        for (lane, value) in values.iter_mut().enumerate() {
-            *value = fours[lane / 4][lane % 4];
-        }
-        Self::load(&values)
-    }
-
-    /// The first three lanes of each four in turn: what was lane 1 comes first, then 2, then 0. The last one stays.
-    #[inline(always)]
-    fn turn_threes(self) -> Self {
-        let values = self.store();
-        let mut turned = values;
-        for four in 0..4 {
-            for lane in 0..3 {
-                turned[4 * four + lane] = values[4 * four + (lane + 1) % 3];
-            }
-        }
-        Self::load(&turned)
-    }
-
     /// The least number of each row among those whose bit is set in `counted`: that of row `i` in lane `i`, infinity
     /// if there is none. None that counts may be NaN.
     #[inline(always)]

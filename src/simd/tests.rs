@@ -78,7 +78,6 @@ fn check_eight<L: Eight>() {
     let (x, y) = (L::load(&a), L::load(&b));
     let four = |from: usize| -> &[f32; 4] { b[from..from + 4].try_into().unwrap() };
     assert_eq!(L::of_fours([four(1), four(3)]).store(), [1, 2, 3, 4, 3, 4, 5, 6].map(|i| b[i]));
-    assert_eq!(x.turn_threes().store(), [1, 2, 0, 3, 5, 6, 4, 7].map(|i| a[i]));
     let [a2, b2] =
         [[0, 1], [2, 3]].map(|[i, j]| [a[i], a[j], b[i], b[j], a[i + 4], a[j + 4], b[i + 4], b[j + 4]]);
     assert_eq!((x.first_pairs(y).store(), x.last_pairs(y).store()), (a2, b2));
@@ -128,11 +127,6 @@ fn check_sixteen<L: Sixteen>() {
             assert_eq!(column[j], fours[(j * 5) & 15][i], "number {i} of record {j}");
         }
     }
-    let row = L::side_by_side([&fours[9], &fours[2], &fours[14], &fours[5]]);
-    let places = [9, 2, 14, 5].map(|j| fours[j]);
-    assert_eq!(row.store(), std::array::from_fn(|lane| places[lane / 4][lane % 4]));
-    let turned = row.turn_threes().store();
-    assert_eq!(turned, std::array::from_fn(|lane| places[lane / 4][[1, 2, 0, 3][lane % 4]]));
     // Row `i` has its least number at `i + turn`, the greatest one eight lanes farther; beside them stand numbers
     // that do not count, one of them none.
     for turn in 0..16 {

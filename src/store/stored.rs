@@ -123,9 +123,7 @@ impl Stored {
     #[inline]
     pub fn corners(&self, primitive: u32) -> [Vec3; 3] {
         match &self.corners {
-            StoredCorners::Records(triangles) => {
-                triangles[primitive as usize].corners().map(Vec3::from_array)
-            }
+            StoredCorners::Records(triangles) => triangles[primitive as usize].corners.map(Vec3::from_array),
             StoredCorners::Mesh { positions, indices } => {
                 indices[primitive as usize].map(|vertex| positions[vertex as usize])
             }

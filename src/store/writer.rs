@@ -154,7 +154,7 @@ fn check(mesh: &Mesh, tree: &KdTree) -> Result<()> {
     }
     let same = |(indices, triangle): (&[u32; 3], &Triangle)| {
         let corners = indices.map(|vertex| mesh.positions.get(vertex as usize).map(Vec3::to_array));
-        matches!(corners, [Some(a), Some(b), Some(c)] if tree.scale().apply(&[a, b, c]) == triangle.corners())
+        matches!(corners, [Some(a), Some(b), Some(c)] if tree.scale().apply(&[a, b, c]) == triangle.corners)
     };
     let is_its = mesh.triangles.par_iter().zip(tree.triangles()).all(same);
     if tree.triangles().len() != triangles || !is_its {

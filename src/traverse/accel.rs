@@ -99,7 +99,7 @@ impl Accel {
     pub fn set_accuracy(&mut self, accuracy: Accuracy) {
         if accuracy == Accuracy::Fast && self.projected.is_empty() {
             let records =
-                self.tree().triangles().par_iter().map(|triangle| Projected::new(&triangle.corners()));
+                self.tree().triangles().par_iter().map(|triangle| Projected::new(&triangle.corners));
             self.projected = records.collect::<Vec<_>>().into();
         }
         self.accuracy = accuracy;

@@ -94,7 +94,7 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
                 }
                 None => M::Test::<W, L>::weights(record, self.u, self.v),
             };
-            let along = triangle::normal(&tree.corners(id as u32));
+            let along = triangle::normal(tree.corners(id as u32));
             u = L::select(lanes, weights[0], u);
             v = L::select(lanes, weights[1], v);
             for axis in 0..3 {

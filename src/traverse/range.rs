@@ -81,7 +81,7 @@ impl<const W: usize> Adapted<W> {
             let t = (f64::from(hits.t[lane]) * self.t_factor[lane]) as f32;
             hits.t[lane] = t.max(rays.tnear[lane]).min(rays.tfar[lane]) + 0.0;
             tree.enter_triangle(hits.primitive[lane]);
-            let normal = triangle::normal(&tree.scale().undo(&tree.corners(hits.primitive[lane])));
+            let normal = triangle::normal(&tree.scale().undo(tree.corners(hits.primitive[lane])));
             for axis in 0..3 {
                 hits.normal[axis][lane] = normal[axis];
             }

@@ -15,8 +15,8 @@
 //! What is given up is agreement between neighbours: each side of a shared edge is decided from its
 //! own numbers, so a ray may slip between the two, or hit both.
 
-use super::{Alone, Candidate, Corners, Lanes3, RENAMED, Test, normal_in_double};
-use crate::simd::{Eight, Lanes, Mask, Simd};
+use super::{Alone, Candidate, Corners, Finds, Lanes3, RENAMED, Test, normal_in_double};
+use crate::simd::{Eight, Lanes};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
@@ -178,17 +178,9 @@ fn renamed<L: Eight>([x, y, z]: [f32; 3], is_x: L::Mask, is_y: L::Mask) -> Lanes
 }
 
 impl Alone for Lines<1, f32> {
+    /// As in [`test`](Test::test), operation by operation, with coordinates renamed lane by lane.
     #[inline(always)]
-    fn sift<S: Simd>(&self, triangles: &[&Projected; 8], tnear: f32, tfar: f32) -> u32 {
-        self.find::<S::F8>(triangles, tnear, tfar)
-    }
-}
-
-impl Lines<1, f32> {
-    /// Which of eight triangles are hit with a `t` from `tnear` to `tfar`: as in [`test`](Test::test), operation by
-    /// operation, with coordinates renamed lane by lane.
-    #[inline(always)]
-    fn find<L: Eight>(&self, triangles: &[&Projected; 8], tnear: f32, tfar: f32) -> u32 {
+    fn find<L: Eight>(&self, triangles: &[&Projected; 8], tnear: f32, tfar: f32) -> Finds<L> {
         let [ci, cj, ck, ni, nj, along_i, along_j, across_i, across_j, apex, names] = columns::<L>(triangles);
         let axis = L::ids_and(L::ids_load(&bytemuck::cast(names.store())), L::ids(AXIS as i32));
         let is_x = L::ids_less(axis, L::ids(1));
@@ -206,25 +198,30 @@ impl Lines<1, f32> {
         let v = across_i * x + across_j * y;
         let u = along - v * apex;
         let inside = zero.le(u) & zero.le(v) & (u + v).le(one);
-        (inside & L::splat(tnear).le(t) & t.le(L::splat(tfar))).bits() & 0xff
+        let hits = inside & L::splat(tnear).le(t) & t.le(L::splat(tfar));
+        Finds { hits, t, open: 0 }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{Chosen, Isa, Task};
+    use crate::simd::{Chosen, Isa, Mask, Simd, Task};
     use proptest::prelude::*;
 
     struct Eights<'a>(&'a Lines<1, f32>, &'a [&'a Projected; 8], [f32; 2]);
 
     impl Task for Eights<'_> {
-        type Output = u32;
+        type Output = [Option<u32>; 8];
 
+        /// The bits of `t` where a triangle is hit.
         #[inline(always)]
-        fn run<S: Simd>(self) -> u32 {
+        fn run<S: Simd>(self) -> [Option<u32>; 8] {
             let Self(ray, triangles, [tnear, tfar]) = self;
-            ray.sift::<S>(triangles, tnear, tfar)
+            let finds = ray.find::<S::F8>(triangles, tnear, tfar);
+            assert_eq!(finds.open, 0);
+            let (hits, t) = (finds.hits.bits(), finds.t.store());
+            std::array::from_fn(|lane| (hits >> lane & 1 == 1).then(|| t[lane].to_bits()))
         }
     }
 
@@ -243,11 +240,10 @@ mod tests {
             let triangles = triangles.each_ref();
             let ray = Lines::<1, f32>::new(&point(24), &point(25), 1);
             for ends in [[0.0, f32::MAX], [0.25, 0.75]] {
-                let wanted = (0..8).filter(|&i| {
-                    let one = ray.test(triangles[i], true);
-                    one.inside && ends[0] <= one.t && one.t <= ends[1]
+                let wanted = triangles.map(|triangle| {
+                    let one = ray.test(triangle, true);
+                    (one.inside && ends[0] <= one.t && one.t <= ends[1]).then(|| one.t.to_bits())
                 });
-                let wanted = wanted.fold(0, |bits, i| bits | 1 << i);
                 for isa in Isa::available() {
                     let chosen = Chosen::new(isa).expect("it is available");
                     assert_eq!(chosen.run(Eights(&ray, &triangles, ends)), wanted, "{isa}");

@@ -1,7 +1,7 @@
 //! What every ray-triangle test is to a traversal kernel.
 
 use super::{Accuracy, Placed, Triangle};
-use crate::simd::{Eight, Lanes, Simd};
+use crate::simd::{Eight, Lanes};
 
 /// Three coordinates, `W` lanes each.
 pub type Lanes3<L> = [L; 3];
@@ -68,32 +68,28 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
 
 /// One ray prepared for being tested against many triangles at once.
 pub trait Alone: Test<1, f32> {
-    /// A bit for each of eight triangles that the ray may hit with a `t` from `tnear` to `tfar`: all of which
-    /// [`test`](Test::test) says so, and few others.
-    fn sift<S: Simd>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> u32;
-
-    /// The same of four.
-    #[inline(always)]
-    fn sift_four<S: Simd>(&self, triangles: &[&Self::Record; 4], tnear: f32, tfar: f32) -> u32 {
-        let [a, b, c, d] = *triangles;
-        self.sift::<S>(&[a, b, c, d, a, b, c, d], tnear, tfar) & 0xf
-    }
-
-    /// Eight rays, each against a triangle of its own: what [`test`](Test::test) finds, to the bit, or leaves to it.
-    #[inline(always)]
-    fn test_eight<L: Eight>(_rays: &[&Self; 8], _triangles: &[&Self::Record; 8]) -> Finds {
-        Finds { hits: 0, open: 0xff, t: [0.0; 8] }
-    }
+    /// Eight triangles against the ray: which of them it hits with a `t` from `tnear` to `tfar`. What is found
+    /// is what [`test`](Test::test) finds, to the bit.
+    fn find<L: Eight>(&self, triangles: &[&Self::Record; 8], tnear: f32, tfar: f32) -> Finds<L>;
 }
 
-/// What eight rays find, a lane each. (Weights are for [`weigh`](Test::weigh) to say, of the hit that counts in the end.)
-pub struct Finds {
-    /// A bit for each ray whose line hits its triangle: `t` is not compared with anything yet.
-    pub hits: u32,
-    /// A bit for each ray of which [`test`](Test::test) has yet to say. None is in `hits`.
-    pub open: u32,
+/// What a ray finds of eight triangles, a lane each. (Weights are for [`weigh`](Test::weigh) to say, of the hit that counts
+/// in the end.)
+pub struct Finds<L: Eight> {
+    /// Triangles that are hit.
+    pub hits: L::Mask,
     /// The ray's parameter, in the lanes of `hits`.
-    pub t: [f32; 8],
+    pub t: L,
+    /// A bit for each triangle of which [`test`](Test::test) has yet to say whether it is hit. None is in `hits`.
+    pub open: u32,
+}
+
+impl<L: Eight> Finds<L> {
+    /// Nothing but triangles to be tested.
+    #[inline(always)]
+    pub(super) fn open(open: u32) -> Self {
+        Self { hits: L::mask_from_bits(0), t: L::splat(0.0), open }
+    }
 }
 
 /// The lanes of a packet that may have hit a triangle.

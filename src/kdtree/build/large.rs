@@ -71,7 +71,7 @@ pub fn chunks_of(triangles: &[Triangle]) -> Chunks {
 /// The references of triangles whose ids begin with `first`, whole.
 pub fn whole(first: u32, triangles: &[Triangle]) -> impl Iterator<Item = Reference> {
     let reference = |(primitive, triangle): (u32, &Triangle)| {
-        Reference::new(primitive, &Aabb::of_points(triangle.corners().map(Into::into)))
+        Reference::new(primitive, &Aabb::of_points(triangle.corners.map(Into::into)))
     };
     (first..).zip(triangles).map(reference)
 }

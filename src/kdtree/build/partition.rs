@@ -10,13 +10,13 @@ use crate::simd::{Chosen, Simd, Task};
 /// Triangles by primitive id.
 pub trait Lookup {
     /// The corners of one that is among them.
-    fn corners(&self, primitive: u32) -> Corners;
+    fn corners(&self, primitive: u32) -> &Corners;
 }
 
 impl Lookup for [Triangle] {
     #[inline(always)]
-    fn corners(&self, primitive: u32) -> Corners {
-        self[primitive as usize].corners()
+    fn corners(&self, primitive: u32) -> &Corners {
+        &self[primitive as usize].corners
     }
 }
 
@@ -94,7 +94,7 @@ impl<T: Lookup + ?Sized> Task for Division<'_, T> {
                 stay += usize::from(!goes);
             } else {
                 let (primitive, bounds) = (reference.primitive(), reference.bounds());
-                let corners = &triangles.corners(primitive);
+                let corners = triangles.corners(primitive);
                 let parts = if clips {
                     clipper.halves(corners, &bounds, axis, position)
                 } else {

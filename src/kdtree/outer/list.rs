@@ -206,9 +206,9 @@ impl Cut {
 }
 
 impl Lookup for Cut {
-    fn corners(&self, primitive: u32) -> Corners {
+    fn corners(&self, primitive: u32) -> &Corners {
         let place = self.primitives.binary_search(&primitive).expect("the plane cuts it");
-        self.triangles[place].corners()
+        &self.triangles[place].corners
     }
 }
 

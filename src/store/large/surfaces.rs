@@ -82,9 +82,9 @@ pub fn write<W: Write + Seek>(
     let (mut bounds, mut zero_area, mut done) = (Aabb::EMPTY, 0, 0);
     out.begin(Kind::Triangles)?;
     by_task(&mesh.triangles, records, |records| {
-        for triangle in &records {
-            bounds = bounds.union(Aabb::of_points(triangle.corners().map(Into::into)));
-            zero_area += u64::from(triangle.plane() == [0.0; 3]);
+        for Triangle { corners, plane } in &records {
+            bounds = bounds.union(Aabb::of_points(corners.map(Into::into)));
+            zero_area += u64::from(*plane == [0.0; 3]);
         }
         done += records.len();
         progress(0.4 + 0.6 * done as f64 / mesh.triangles.len() as f64);

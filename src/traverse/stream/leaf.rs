@@ -1,22 +1,25 @@
 //! One ray against the triangles of a leaf, eight at a time.
 //!
-//! The mode sifts eight triangles at once, and what is left of them is kept with the ray. Of most eights nothing is:
-//! those rays go on at once, by arithmetic alone. The others stand in a set of their own, and what they have left goes
-//! through the mode's own test, with what others have left ([`pairs`](super::pairs)). The nearest hit is taken. So hits
-//! are what packets find, bit for bit, and no branch depends on whether a triangle is hit.
+//! The mode sifts eight triangles at once, and what it finds is kept with the ray. Most eights hold nothing: those
+//! rays go on at once, by arithmetic alone. The others stand in a list of their own, in which every ray has
+//! something to look at: what is in doubt goes through the mode's own test, and the nearest is taken. So hits are
+//! what packets find, bit for bit, and no branch depends on whether a triangle is hit.
 
 use super::flight::Flight;
 use crate::geometry::triangle::Alone;
-use crate::simd::{Eight, Simd, prefetch};
+use crate::simd::{Eight, Mask, prefetch};
 use std::hint::select_unpredictable;
 
-/// Where a ray is in its leaf: eight triangles, and which of them it may hit.
+/// Where a ray is in its leaf: eight triangles, and what it found in them.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
 pub struct Leaf {
     /// The triangles' ids. Behind the leaf's last one is the first of the eight again.
     primitives: [i32; 8],
-    /// Those that it may hit.
+    /// `t` of those in `hits`.
+    t: [f32; 8],
+    /// Triangles that are hit, and those that are in doubt.
+    hits: u32,
     open: u32,
     /// The word behind the eight, and how many triangles are left with them.
     next: u32,
@@ -25,18 +28,12 @@ pub struct Leaf {
 
 impl Leaf {
     /// No leaf.
-    pub const NONE: Self = Self { primitives: [0; 8], open: 0, next: 0, left: 0 };
+    pub const NONE: Self = Self { primitives: [0; 8], t: [0.0; 8], hits: 0, open: 0, next: 0, left: 0 };
 
-    /// Whether the ray may hit any of the eight.
+    /// Whether the eight have something to look at.
     #[inline(always)]
-    pub fn is_open(&self) -> bool {
-        self.open != 0
-    }
-
-    /// The eight, and a bit for each that it may hit.
-    #[inline(always)]
-    pub fn left_open(&self) -> (&[i32; 8], u32) {
-        (&self.primitives, self.open)
+    pub fn has_found(&self) -> bool {
+        self.hits | self.open != 0
     }
 
     /// Whether others of the leaf follow. (In no leaf they do not.)
@@ -45,14 +42,8 @@ impl Leaf {
         self.left > 8
     }
 
-    /// Whether there are more than four.
-    #[inline(always)]
-    pub fn is_more_than_four(&self) -> bool {
-        self.left > 4
-    }
-
-    /// Takes up the next eight triangles: others of the same leaf if some are left, or else the first ones of the leaf
-    /// whose record begins at `record` in `words`. Fetches the first four of them.
+    /// Fetches the next eight triangles: others of the same leaf if some are left, or else the first ones of the leaf
+    /// whose record begins at `record` in `words`.
     #[inline(always)]
     pub fn fetch<L: Eight, R>(&mut self, words: &[u32], record: usize, records: &[R]) {
         let goes_on = self.goes_on();
@@ -63,56 +54,62 @@ impl Leaf {
         let ids = L::ids_load(bytemuck::cast_ref::<[u32; 8], [i32; 8]>(words));
         let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
         self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
-        fetch_four(self.primitives.first_chunk().expect("four of eight"), records);
-    }
-
-    /// Fetches the other four.
-    #[inline(always)]
-    pub fn fetch_others<R>(&self, records: &[R]) {
-        fetch_four(self.primitives.last_chunk().expect("four of eight"), records);
-    }
-}
-
-/// Fetches four triangles.
-#[inline(always)]
-fn fetch_four<R>(primitives: &[i32; 4], records: &[R]) {
-    for &primitive in primitives {
-        let record = records.as_ptr().wrapping_add(primitive as usize);
-        prefetch(record);
-        prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
+        for primitive in self.primitives {
+            let record = records.as_ptr().wrapping_add(primitive as usize);
+            prefetch(record);
+            prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
+        }
     }
 }
 
 impl<A: Alone> Flight<A> {
-    /// Sifts the triangles that were fetched, of which there are four at most.
-    #[inline(always)]
-    pub fn sift_four<S: Simd>(&mut self, records: &[A::Record]) {
-        let mut triangles = [&records[0]; 4];
-        for lane in 0..4 {
-            triangles[lane] = &records[self.leaf.primitives[lane] as usize];
-        }
-        let lanes = (1 << self.leaf.left.min(4)) - 1;
-        self.leaf.open = self.test.sift_four::<S>(&triangles, self.tnear, self.tfar) & lanes;
-    }
-
     /// Sifts the eight triangles that were fetched.
     #[inline(always)]
-    pub fn sift<S: Simd>(&mut self, records: &[A::Record]) {
+    pub fn sift<L: Eight>(&mut self, records: &[A::Record]) {
         let mut triangles = [&records[0]; 8];
         for lane in 0..8 {
             triangles[lane] = &records[self.leaf.primitives[lane] as usize];
         }
         let lanes = (1 << self.leaf.left.min(8)) - 1;
-        self.leaf.open = self.test.sift::<S>(&triangles, self.tnear, self.tfar) & lanes;
+        let finds = self.test.find::<L>(&triangles, self.tnear, self.tfar);
+        self.leaf.t = finds.t.store();
+        self.leaf.hits = finds.hits.bits() & lanes;
+        self.leaf.open = finds.open & lanes;
     }
 
-    /// Takes a hit, if it is one in the ray's interval, and nearer than what the ray has or as near and of a lower id.
+    /// Takes the nearest of what was found, and says whether it is nearer than what the ray had.
     #[inline(always)]
-    pub fn take(&mut self, is_hit: bool, t: f32, primitive: u32) {
-        let nearer = (t < self.tfar) | ((t == self.tfar) & (primitive < self.primitive));
-        let taken = is_hit & (self.tnear <= t) & nearer;
-        self.tfar = select_unpredictable(taken, t, self.tfar);
-        self.primitive = select_unpredictable(taken, primitive, self.primitive);
+    pub fn settle<L: Eight>(&mut self, records: &[A::Record]) -> bool {
+        let Leaf { primitives, t, hits, mut open, .. } = self.leaf;
+        let mut found = false;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize & 7;
+            open &= open - 1;
+            let candidate = self.test.test(&records[primitives[lane] as usize], true);
+            if candidate.inside && self.tnear <= candidate.t {
+                found |= self.take(candidate.t, primitives[lane] as u32);
+            }
+        }
+
+        // Of several that are as near the one with the lowest id counts.
+        let t = L::select(L::mask_from_bits(hits), L::load(&t), L::splat(f32::INFINITY));
+        let least = t.least();
+        let mut nearest = t.eq(L::splat(least)).bits() & hits;
+        while nearest != 0 {
+            let lane = nearest.trailing_zeros() as usize & 7;
+            nearest &= nearest - 1;
+            found |= self.take(least, primitives[lane] as u32);
+        }
+        found
+    }
+
+    /// Takes a hit if it is nearer than what the ray has, or as near and of a lower id; says whether it is.
+    #[inline(always)]
+    fn take(&mut self, t: f32, primitive: u32) -> bool {
+        let nearer = t < self.tfar || t == self.tfar && primitive < self.primitive;
+        self.tfar = select_unpredictable(nearer, t, self.tfar);
+        self.primitive = select_unpredictable(nearer, primitive, self.primitive);
+        nearer
     }
 }
 

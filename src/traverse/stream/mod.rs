@@ -2,20 +2,19 @@
 //!
 //! Incoherent rays have nothing to share, and one by one they spend their time waiting for memory and on
 //! branches that nobody can foresee. Here some thirty rays are on their way at once. Each round does one
-//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or up to four or eight triangles of a
-//! leaf ([`leaf`]). Rays that need the same work stand in one set, so that no branch depends on what a ray meets; and what
+//! piece of work for each: a line of the tree ([`step`](step::step), three levels), or eight triangles of a leaf
+//! ([`leaf`]). Rays that need the same work stand in one list, so that no branch depends on what a ray meets; and what
 //! a ray needs in its next round is fetched while the others have theirs.
 //!
 //! ```text
 //!          +---------+---------------------------------------+
 //!          v         v                    nothing            |
 //! start -> lines -> leaves -> triangles ---------> (next in the leaf or on the stack) -> end: the next ray starts
-//!  fetch:  line     record    triangles --> pairs -->^
+//!  fetch:  line     record    triangles --> hits --->^
 //! ```
 //!
-//! A set is a word with a bit for each ray, so that a ray is sent to one by arithmetic in a register. (With lists of
-//! numbers in memory, rays took 1.07 to 1.1 times as long.) Triangles that a ray may hit are tested together with those of
-//! other rays ([`pairs`]).
+//! Rays that found something in their triangles have a list of their own too: with a branch for each eight and one for
+//! each longer leaf instead, and the lengths of lists in memory, rays took 1.05 to 1.27 times as long.
 //!
 //! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
 //! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not
@@ -24,7 +23,6 @@
 mod accel;
 mod flight;
 mod leaf;
-mod pairs;
 mod step;
 
 use super::lanes::RayPacket;
@@ -35,7 +33,6 @@ use crate::geometry::{Hit, Ray};
 use crate::kdtree::{Exit, KdTree, Tree};
 use crate::simd::{Simd, prefetch};
 use flight::{Flight, Group, NONE};
-use pairs::Pairs;
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 use step::{END, Waiting, step};
@@ -76,7 +73,7 @@ impl Answers for Closest<'_> {
             u: u + 0.0,
             v: v + 0.0,
             primitive: flight.primitive,
-            normal: triangle::normal(&tree.corners(flight.primitive)),
+            normal: triangle::normal(tree.corners(flight.primitive)),
         };
     }
 
@@ -117,72 +114,53 @@ impl Answers for Any<'_> {
     }
 }
 
-/// Some of the rays in flight, a bit for each: those that wait for the same work.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct Set(u32);
+/// Places for all rays in flight, and for one that is not to be there.
+type Places = [u16; IN_FLIGHT + 1];
 
-const _: () = assert!(IN_FLIGHT == u32::BITS as usize);
+/// Rays in flight that wait for the same work. (The length stands apart from the array, so that it can be kept in
+/// a register.)
+struct List<'a> {
+    flights: &'a mut Places,
+    len: usize,
+}
 
-impl Set {
-    const NONE: Self = Self(0);
-    const ALL: Self = Self(u32::MAX);
-
-    /// Puts a ray there if it is to be there.
-    #[inline(always)]
-    fn put_if(&mut self, flight: usize, wanted: bool) {
-        self.0 |= u32::from(wanted) << (flight % IN_FLIGHT);
+impl<'a> List<'a> {
+    const fn new(flights: &'a mut Places) -> Self {
+        Self { flights, len: 0 }
     }
 
-    /// Takes out the first that is there.
+    /// Puts a ray on the list if it is to be there.
     #[inline(always)]
-    fn pop(&mut self) -> Option<usize> {
-        let first = (self.0 != 0).then(|| self.0.trailing_zeros() as usize % IN_FLIGHT);
-        self.0 &= self.0.wrapping_sub(1);
-        first
+    fn push_if(&mut self, flight: usize, wanted: bool) {
+        self.flights[self.len] = flight as u16;
+        self.len += usize::from(wanted);
     }
 
     #[inline(always)]
-    const fn len(self) -> usize {
-        self.0.count_ones() as usize
+    fn get(&self, index: usize) -> usize {
+        usize::from(self.flights[index])
     }
 }
 
 /// What a ray goes on with.
-struct Ways {
-    lines: Set,
-    leaves: Set,
-    ended: Set,
+struct Lists<'a> {
+    lines: List<'a>,
+    leaves: List<'a>,
+    ended: List<'a>,
 }
 
-impl Ways {
-    /// Sends a ray to the exit that it takes, if it goes on at all, and fetches what it will need.
+impl Lists<'_> {
+    /// Puts a ray on the list for the exit that it takes, if it goes on at all, and fetches what it will need.
     #[inline(always)]
     fn route(&mut self, tree: &KdTree, flight: usize, exit: i32, goes_on: bool) {
         let ended = exit == END;
         let exit = Exit(exit);
-        self.lines.put_if(flight, !exit.is_leaf() & goes_on);
-        self.leaves.put_if(flight, exit.is_leaf() & !ended & goes_on);
-        self.ended.put_if(flight, ended & goes_on);
+        self.lines.push_if(flight, !exit.is_leaf() & goes_on);
+        self.leaves.push_if(flight, exit.is_leaf() & !ended & goes_on);
+        self.ended.push_if(flight, ended & goes_on);
         let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
         let record = tree.references().as_ptr().wrapping_add(exit.record());
         prefetch(select_unpredictable(exit.is_leaf(), record, line));
-    }
-
-    /// Sends a ray on that has sifted its triangles: to be tested, or if nothing is left of them, to the next ones of its
-    /// leaf, or if that was all, to what is next on its stack.
-    #[inline(always)]
-    fn go_on<A>(
-        &mut self,
-        tree: &KdTree,
-        number: usize,
-        flight: &mut Flight<A>,
-        waiting: &Waiting,
-        hits: &mut Set,
-    ) {
-        let (found, goes_on) = (flight.leaf.is_open(), flight.leaf.goes_on());
-        hits.put_if(number, found);
-        flight.top -= u32::from(!found & !goes_on);
-        self.route(tree, number, waiting.exits[flight.top as usize], !found);
     }
 }
 
@@ -201,7 +179,7 @@ pub fn trace<S: Simd, M: Mode, A: Answers>(
     // Taken out, not borrowed: a closure would be compiled without the instruction set.
     let mut stacks = STACKS.take();
     stacks.resize(IN_FLIGHT, Waiting::new());
-    fly::<S, M, A>(resident, rays, answers, stacks.first_chunk_mut().expect("as many as rays"));
+    fly::<S, M, A>(resident, rays, answers, &mut stacks);
     STACKS.set(stacks);
 }
 
@@ -210,19 +188,41 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
-    stacks: &mut [Waiting; IN_FLIGHT],
+    stacks: &mut [Waiting],
 ) {
     let Resident { tree, records } = *resident;
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
-    let mut ways = Ways { lines: Set::NONE, leaves: Set::NONE, ended: Set::NONE };
-    let (mut fours, mut eights, mut hits) = (Set::NONE, Set::NONE, Set::NONE);
-    let mut free = Set::ALL;
+    let [mut a, mut b, mut c, mut d, mut e] = [[0; IN_FLIGHT + 1]; 5];
+    let mut lists = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
+    let (mut triangles, mut hits) = (List::new(&mut d), List::new(&mut e));
+    let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
     let mut ahead = 0;
     let mut group = Group::new();
-    let mut pairs = Pairs::new();
     let plain = tree.scale().is_none();
     loop {
+        // Leaves whose records are here.
+        for i in 0..lists.leaves.len {
+            let k = lists.leaves.get(i);
+            let flight = &mut flights[k];
+            let exit = Exit(stacks[k].exits[flight.top as usize]);
+            flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
+            triangles.push_if(k, true);
+        }
+        lists.leaves.len = 0;
+
+        // Lines. Those who go on with a line stay on the list.
+        let lines_here = lists.lines.len;
+        lists.lines.len = 0;
+        for i in 0..lines_here {
+            let k = lists.lines.get(i);
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let top = flight.top as usize;
+            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            flight.top = top as u32;
+            lists.route(tree, k, waiting.exits[top], true);
+        }
+
         // New rays in the place of those that have ended, eight at a time.
         while ahead < rays.len() && free.len() >= 8 {
             let eight = &rays[ahead..rays.len().min(ahead + 8)];
@@ -234,9 +234,9 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 } else if group.flies >> lane & 1 == 0 {
                     answers.missed(number);
                 } else {
-                    let k = free.pop().expect("as many as rays");
+                    let k = usize::from(free.pop().expect("as many as rays"));
                     let flight = group.start(lane, ray, number, &mut stacks[k]);
-                    ways.route(tree, k, stacks[k].exits[flight.top as usize], true);
+                    lists.route(tree, k, stacks[k].exits[flight.top as usize], true);
                     if flights.is_empty() {
                         // The others are written over before they are looked at.
                         flights.resize(IN_FLIGHT, flight);
@@ -246,70 +246,48 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             }
             ahead += eight.len();
         }
-        // (Fixed in length, so that no ray's number has to be checked.)
-        let Some(flights) = flights.first_chunk_mut::<IN_FLIGHT>().filter(|_| free != Set::ALL) else {
+        if free.len() == IN_FLIGHT {
             return;
-        };
+        }
 
-        // Triangles, four or eight.
-        while let Some(k) = fours.pop() {
-            flights[k].sift_four::<S>(records);
-            ways.go_on(tree, k, &mut flights[k], &stacks[k], &mut hits);
+        // Triangles. Where nothing is found, a ray goes on with the next ones of its leaf, or if that was all, with what
+        // is next on its stack.
+        for i in 0..triangles.len {
+            let k = triangles.get(i);
+            let (flight, waiting) = (&mut flights[k], &stacks[k]);
+            flight.sift::<S::F8>(records);
+            let (found, goes_on) = (flight.leaf.has_found(), flight.leaf.goes_on());
+            hits.push_if(k, found);
+            flight.top -= u32::from(!found & !goes_on);
+            lists.route(tree, k, waiting.exits[flight.top as usize], !found);
         }
-        while let Some(k) = eights.pop() {
-            flights[k].sift::<S>(records);
-            ways.go_on(tree, k, &mut flights[k], &stacks[k], &mut hits);
-        }
+        triangles.len = 0;
 
         // Hits.
-        let mut tested = hits;
-        while let Some(k) = tested.pop() {
-            pairs.add::<S::F8, _>(k, &flights[k]);
-        }
-        pairs.settle::<S::F8, _>(flights, records);
-        while let Some(k) = hits.pop() {
+        for i in 0..hits.len {
+            let k = hits.get(i);
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            let ends = A::ANY & (flight.primitive != NONE);
+            let ends = flight.settle::<S::F8>(records) & A::ANY;
             let mut top = flight.top as usize;
             if ends | !flight.leaf.goes_on() {
                 top = waiting.reached::<S::F8>(select_unpredictable(ends, 0, top - 1), flight.tfar);
             }
             flight.top = top as u32;
-            ways.route(tree, k, waiting.exits[top], true);
+            lists.route(tree, k, waiting.exits[top], true);
         }
+        hits.len = 0;
 
         // Rays that have ended.
-        while let Some(k) = ways.ended.pop() {
+        for i in 0..lists.ended.len {
+            let k = lists.ended.get(i);
             let flight = &flights[k];
             if flight.primitive == NONE {
                 answers.missed(flight.ray as usize);
             } else {
                 answers.found::<M>(resident, flight);
             }
-            free.put_if(k, true);
+            free.push(k as u16);
         }
-
-        // Leaves whose records are here.
-        while let Some(k) = ways.leaves.pop() {
-            let flight = &mut flights[k];
-            let exit = Exit(stacks[k].exits[flight.top as usize]);
-            flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
-            fours.put_if(k, !flight.leaf.is_more_than_four());
-            eights.put_if(k, flight.leaf.is_more_than_four());
-        }
-        let mut longer = eights;
-        while let Some(k) = longer.pop() {
-            flights[k].leaf.fetch_others(records);
-        }
-
-        // Lines. Those who go on with a line are there again in the next round.
-        let mut here = std::mem::replace(&mut ways.lines, Set::NONE);
-        while let Some(k) = here.pop() {
-            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            let top = flight.top as usize;
-            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
-            flight.top = top as u32;
-            ways.route(tree, k, waiting.exits[top], true);
-        }
+        lists.ended.len = 0;
     }
 }

@@ -209,16 +209,20 @@ impl Block {
         for (lane, id) in primitives.iter().enumerate().take(16) {
             triangles[lane] = tree.triangle(*id);
         }
-        for axis in 0..3 {
+        for four in 0..3 {
             let mut fours = [&[0.0; 4]; 16];
             for lane in 0..16 {
-                fours[lane] = &triangles[lane].rows()[axis];
+                fours[lane] = &triangles[lane].fours()[four];
             }
-            let [p0, p1, p2, normal] = L::of_fours(&fours);
-            self.corners[0][axis] = p0.store();
-            self.corners[1][axis] = p1.store();
-            self.corners[2][axis] = p2.store();
-            self.normal[axis] = normal.store();
+            let columns = L::of_fours(&fours);
+            for (i, column) in columns.into_iter().enumerate() {
+                let place = 4 * four + i;
+                let row = match place / 3 {
+                    3 => &mut self.normal[place % 3],
+                    corner => &mut self.corners[corner][place % 3],
+                };
+                *row = column.store();
+            }
         }
     }
 

@@ -10,8 +10,8 @@
 mod determinant;
 
 use super::watertight::Shear;
-use super::{Alone, Candidate, Corners, Lanes3, Test, Triangle};
-use crate::simd::{Lanes, Mask, Simd};
+use super::{Alone, Candidate, Corners, Finds, Lanes3, Test, Triangle};
+use crate::simd::{Eight, Lanes, Mask};
 use determinant::{along_normal, volume};
 use glam::{DVec3, Vec3};
 
@@ -52,11 +52,12 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
 
     #[inline(always)]
     fn test(&self, triangle: &Triangle, lanes: L::Mask) -> Candidate<W, L> {
-        let likely = self.shear.likely(triangle) & lanes;
+        let corners = &triangle.corners;
+        let likely = self.shear.likely(corners) & lanes;
         if !likely.any() {
             return Candidate::none(likely);
         }
-        let met = meet_lanes(likely.bits(), &self.origin, &self.direction, &triangle.corners());
+        let met = meet_lanes(likely.bits(), &self.origin, &self.direction, corners);
         Candidate {
             inside: L::mask_from_bits(met.inside),
             t: L::load(&met.t),
@@ -68,8 +69,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
 
 impl Alone for Filter<1, f32> {
     #[inline(always)]
-    fn sift<S: Simd>(&self, triangles: &[&Triangle; 8], _tnear: f32, _tfar: f32) -> u32 {
-        self.shear.likely_of_eight::<S::F8>(triangles)
+    fn find<L: Eight>(&self, triangles: &[&Triangle; 8], _tnear: f32, _tfar: f32) -> Finds<L> {
+        Finds::open(self.shear.likely_of_eight::<L>(triangles))
     }
 }
 

@@ -14,8 +14,7 @@
 //! hits where it enters the triangle. Last, `t` is kept between the corners' depths.
 
 use super::Shear;
-use crate::geometry::triangle::record::NORMAL;
-use crate::geometry::triangle::{Lanes3, Triangle, normal_in_double};
+use crate::geometry::triangle::{Corners, Lanes3, Triangle, normal_in_double};
 use crate::simd::{Lanes, Mask};
 use glam::DVec3;
 
@@ -51,10 +50,11 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         sheared: &[Lanes3<L>; 3],
         edges: &Lanes3<L>,
     ) -> L {
-        let has_area = triangle.plane() != [0.0; 3];
-        let (t, speed) = if has_area { self.meet_plane(triangle) } else { self.meet_line(triangle) };
+        let Triangle { corners, plane } = triangle;
+        let (t, speed) =
+            if *plane == [0.0; 3] { self.meet_line(corners) } else { self.meet_plane(*plane, &corners[0]) };
         let clipped = are_clipped(inside, sheared, edges, speed, self.direction[2].abs());
-        let t = if clipped.any() { L::select(clipped, self.clip(triangle, t), t) } else { t };
+        let t = if clipped.any() { L::select(clipped, self.clip(corners, t), t) } else { t };
 
         let [[_, _, az], [_, _, bz], [_, _, cz]] = *sheared;
         let scale = self.shear[2];
@@ -63,17 +63,12 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         t.max(nearest).min(farthest)
     }
 
-    /// Where the rays meet the triangle's plane, and their speed along its normal.
+    /// Where the rays meet a plane, and their speed along its normal.
     #[inline(always)]
-    fn meet_plane(&self, triangle: &Triangle) -> (L, L) {
-        self.meet_plane_along(&self.column(triangle, NORMAL), triangle)
-    }
-
-    /// The same for a plane through the first corner with another normal, renamed.
-    #[inline(always)]
-    fn meet_plane_along(&self, normal: &Lanes3<L>, triangle: &Triangle) -> (L, L) {
-        let ([nx, ny, nz], [px, py, pz]) = (*normal, self.translated(triangle, 0));
-        self.meet(normal, nx * px + ny * py + nz * pz)
+    fn meet_plane(&self, normal: [f32; 3], point: &[f32; 3]) -> (L, L) {
+        let normal = self.splat_renamed(&normal);
+        let ([nx, ny, nz], [px, py, pz]) = (normal, self.translated(point));
+        self.meet(&normal, nx * px + ny * py + nz * pz)
     }
 
     /// The same for a plane at a height along its normal, renamed, from the origins.
@@ -87,27 +82,24 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// Where the rays pass a triangle that is no more than a line. (It has to be hit: neighbours on
     /// either side of it see its corners moved by roundings, and it fills what opens between them.)
     #[inline(always)]
-    fn meet_line(&self, triangle: &Triangle) -> (L, L) {
+    fn meet_line(&self, corners: &Corners) -> (L, L) {
         // Of two planes that hold the line, each lane takes the one it meets more steeply.
-        let [p0, p1, p2] = triangle.corners().map(|corner| DVec3::from_array(corner.map(f64::from)));
+        let [p0, p1, p2] = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
         let (e, f) = (p1 - p0, p2 - p0);
         let along = if e.length_squared() > f.length_squared() { e } else { f };
         let (one, other) = along.normalize_or(DVec3::X).any_orthonormal_pair();
-        let one = self.splat_renamed(&one.as_vec3().to_array());
-        let other = self.splat_renamed(&other.as_vec3().to_array());
-        let (t, slow) = self.meet_plane_along(&one, triangle);
-        let (u, fast) = self.meet_plane_along(&other, triangle);
+        let (t, slow) = self.meet_plane(one.as_vec3().to_array(), &corners[0]);
+        let (u, fast) = self.meet_plane(other.as_vec3().to_array(), &corners[0]);
         let better = slow.abs().lt(fast.abs());
         (L::select(better, u, t), L::select(better, fast, slow))
     }
 
     /// Moves `t` to where the rays are between the planes that stand on the triangle's edges.
     #[inline(always)]
-    fn clip(&self, triangle: &Triangle, t: L) -> L {
-        let corners = &triangle.corners();
+    fn clip(&self, corners: &Corners, t: L) -> L {
         let normal = normal_in_double(corners);
         let points =
-            [self.translated(triangle, 0), self.translated(triangle, 1), self.translated(triangle, 2)];
+            [self.translated(&corners[0]), self.translated(&corners[1]), self.translated(&corners[2])];
         let mut far = L::splat(0.0);
         for [x, y, z] in points {
             far = far.max(x.abs()).max(y.abs()).max(z.abs());
@@ -175,18 +167,18 @@ fn is_well_inside<const W: usize, L: Lanes<W>>(
 mod tests {
     use super::super::edge_functions;
     use super::*;
-    use crate::geometry::triangle::{Corners, Test};
+    use crate::geometry::triangle::Test;
     use glam::Vec3;
 
     /// A ray, at its end: whether nothing is to be clipped by [`is_well_inside`], and `t` before and after clipping.
     fn clip(origin: Vec3, direction: Vec3, corners: &Corners) -> (bool, f32, f32) {
         let ray = Shear::<1, f32>::new(&origin.to_array(), &direction.to_array(), 1);
         let triangle = Triangle::new(*corners);
-        let sheared = ray.sheared(&triangle);
+        let sheared = [ray.sheared(&corners[0]), ray.sheared(&corners[1]), ray.sheared(&corners[2])];
         let (inside, edges, _) = edge_functions(&sheared, true);
-        let (t, speed) = ray.meet_plane(&triangle);
+        let (t, speed) = ray.meet_plane(triangle.plane, &corners[0]);
         let steep = FLAT * ray.direction[2].abs() <= speed.abs();
-        (inside && steep && is_well_inside(&sheared, &edges), t, ray.clip(&triangle, t))
+        (inside && steep && is_well_inside(&sheared, &edges), t, ray.clip(corners, t))
     }
 
     #[test]

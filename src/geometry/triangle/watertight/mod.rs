@@ -17,10 +17,9 @@
 
 mod alone;
 mod distance;
-mod pairs;
 mod placed;
 
-use super::{Candidate, Lanes3, Placed, RENAMED, Test, Triangle};
+use super::{Candidate, Corners, Lanes3, Placed, RENAMED, Test, Triangle};
 use crate::simd::{Lanes, Mask};
 
 /// What the test needs to know of `W` rays: the shear that takes each to the z axis.
@@ -64,37 +63,17 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
         }
     }
 
-    /// A triangle's corner, or its normal, in every lane, with its coordinates renamed.
-    #[inline(always)]
-    fn column(&self, triangle: &Triangle, column: usize) -> Lanes3<L> {
-        let rows = triangle.rows();
-        match self.major {
-            Some(axis) => {
-                let [i, j, k] = RENAMED[axis];
-                [L::splat(rows[i][column]), L::splat(rows[j][column]), L::splat(rows[k][column])]
-            }
-            None => {
-                let [x, y, z] = rows;
-                self.renamed(&[L::splat(x[column]), L::splat(y[column]), L::splat(z[column])])
-            }
-        }
-    }
-
     /// A corner relative to the origins, with its coordinates renamed.
     #[inline(always)]
-    fn translated(&self, triangle: &Triangle, corner: usize) -> Lanes3<L> {
-        let [x, y, z] = self.column(triangle, corner);
+    fn translated(&self, corner: &[f32; 3]) -> Lanes3<L> {
+        let [x, y, z] = self.splat_renamed(corner);
         [x - self.origin[0], y - self.origin[1], z - self.origin[2]]
     }
 
-    /// All corners so, with x and y sheared so that the rays run along z.
+    /// The same with x and y sheared so that the rays run along z.
     #[inline(always)]
-    fn sheared(&self, triangle: &Triangle) -> [Lanes3<L>; 3] {
-        [
-            self.shear(self.translated(triangle, 0)),
-            self.shear(self.translated(triangle, 1)),
-            self.shear(self.translated(triangle, 2)),
-        ]
+    fn sheared(&self, corner: &[f32; 3]) -> Lanes3<L> {
+        self.shear(self.translated(corner))
     }
 
     /// A translated point with x and y sheared so that the rays run along z.
@@ -111,8 +90,8 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     /// `36u far (wide + 2u far)`, and by some of the smallest floats where products underflow.
     /// Where anything overflows, so does the bound, and the lane is likely.
     #[inline(always)]
-    pub(super) fn likely(&self, triangle: &Triangle) -> L::Mask {
-        likely(self.sheared(triangle))
+    pub(super) fn likely(&self, corners: &Corners) -> L::Mask {
+        likely([self.sheared(&corners[0]), self.sheared(&corners[1]), self.sheared(&corners[2])])
     }
 }
 
@@ -202,12 +181,15 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
 
     #[inline(always)]
     fn test(&self, triangle: &Triangle, lanes: L::Mask) -> Candidate<W, L> {
-        self.decide(triangle, self.sheared(triangle), lanes)
+        let [a, b, c] = &triangle.corners;
+        self.decide(triangle, [self.sheared(a), self.sheared(b), self.sheared(c)], lanes)
     }
 
     #[inline(always)]
     fn weigh(&self, triangle: &Triangle, lanes: L::Mask) -> [L; 2] {
-        let (_, [_, b, c], sum) = edge_functions(&self.sheared(triangle), lanes);
+        let [a, b, c] = &triangle.corners;
+        let corners = [self.sheared(a), self.sheared(b), self.sheared(c)];
+        let (_, [_, b, c], sum) = edge_functions(&corners, lanes);
         [b / sum, c / sum]
     }
 
