@@ -155,10 +155,12 @@ impl Directory {
     /// all, as many as come: otherwise some sets would have to give blocks up that others have room for. From then on, one
     /// has to go for each that comes, and two where a set has more than its ways.
     fn ways(&self, held: usize) -> usize {
-        match self.held.load(Ordering::Relaxed) <= self.shape.blocks() {
-            true => usize::MAX,
-            false if held > self.shape.ways => self.shape.ways.max(held - 2),
-            false => held.saturating_sub(1).max(1),
+        if self.held.load(Ordering::Relaxed) <= self.shape.blocks() {
+            usize::MAX
+        } else if held > self.shape.ways {
+            self.shape.ways.max(held - 2)
+        } else {
+            held.saturating_sub(1).max(1)
         }
     }
 

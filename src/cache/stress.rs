@@ -34,6 +34,16 @@ impl Source for Numbered {
     }
 }
 
+/// Whether a block that is here is full of its own number.
+///
+/// # Safety
+/// It was here when the epoch was entered that the caller is in.
+unsafe fn is_itself(blocks: &Blocks, block: u32) -> bool {
+    // SAFETY: the caller says so.
+    let words: &[u8; BLOCK] = unsafe { &*blocks.slots.at(block as usize).cast() };
+    words.as_chunks::<4>().0.iter().all(|word| *word == (block + 1).to_le_bytes())
+}
+
 /// Threads that ask for blocks at random, hold some for a while, and look whether they are what they
 /// should be, in a cache that is much too small for all.
 fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
@@ -89,13 +99,8 @@ fn stress(threads: usize, options: &CacheOptions, rounds: u32, bounded: bool) {
                     };
                     reader.enter();
                     drop(gathered);
-                    let found = || {
-                        wanted.iter().all(|&block| {
-                            // SAFETY: it was here when the epoch was entered, which goes on.
-                            let words: &[u8; BLOCK] = unsafe { &*blocks.slots.at(block as usize).cast() };
-                            words.as_chunks::<4>().0.iter().all(|word| *word == (block + 1).to_le_bytes())
-                        })
-                    };
+                    // SAFETY: they were here when the epoch was entered, which goes on.
+                    let found = || wanted.iter().all(|&block| unsafe { is_itself(blocks, block) });
                     assert!(found(), "{wanted:?} at once");
                     (0..random(4)).for_each(|_| thread::yield_now());
                     assert!(found(), "{wanted:?} later in the epoch");
@@ -274,13 +279,7 @@ fn stress_known(policy: Replacement, loading: Loading, prefetch: Prefetch) {
                     for _ in 0..2 {
                         for block in list {
                             // SAFETY: it was here when the epoch was entered, which goes on.
-                            let words: &[u8; BLOCK] = unsafe { &*blocks.slots.at(block as usize).cast() };
-                            let is_it = words
-                                .as_chunks::<4>()
-                                .0
-                                .iter()
-                                .all(|word| *word == (block + 1).to_le_bytes());
-                            assert!(is_it, "{block} is another's");
+                            assert!(unsafe { is_itself(blocks, block) }, "{block} is another's");
                         }
                         thread::yield_now();
                     }
@@ -360,4 +359,23 @@ fn what_others_give_up_is_looked_at_anew_and_what_nobody_uses_goes_unnoticed() {
     blocks.clear();
     bring(39);
     assert!(!visit() && visit());
+}
+
+#[test]
+fn an_era_ends_with_its_ticks_where_nothing_goes() {
+    // As `ERA` has it: in ticks, of 64 squares each.
+    const ERA: u32 = 1 << 14;
+    let options = CacheOptions { block: BLOCK, loading: Loading::Synchronous, ..CacheOptions::default() };
+    let plan = Plan::new(&options, 100, 3, 1, 1).expect("enough");
+    let layout = Layout::new([0, 0, 0, 10 * BLOCK, 0, 0], BLOCK);
+    let (blocks, _loaders) = Blocks::new(layout, Box::new(Numbered), &options, &plan, 1).expect("starts");
+    let first = blocks.words.eras.now();
+    for (squares, is_first) in [(0, true), (ERA * 64, true), (1, false)] {
+        blocks.sessions.fetch_add(squares, Ordering::Relaxed);
+        blocks.begin_frame();
+        assert_eq!(blocks.words.eras.now() == first, is_first, "{squares} more");
+    }
+    let second = blocks.words.eras.now();
+    blocks.begin_frame();
+    assert_eq!(blocks.words.eras.now(), second, "it has just begun");
 }

@@ -74,6 +74,7 @@ mod sync {
     pub use std::sync::PoisonError;
 }
 
+mod parts;
 mod scenes;
 
 use std::env;
@@ -95,10 +96,10 @@ const CHECKS: [(&str, fn(), usize); 18] = [
     ("a whole scene is whole for as long as it is read", scenes::all_goes, 6000),
     ("a scene becomes whole, and is no longer", scenes::whole_and_not, 3000),
     ("loaders end whatever was asked for ahead of need", scenes::ahead_at_the_end, 1500),
-    ("what is retired is freed when nobody reads it", scenes::epochs_hold, 3000),
-    ("what is known to be here can be read", scenes::known_lists_hold, 6000),
-    ("the gate lets in as many as there are places", scenes::the_gate_holds, 3000),
-    ("a quota comes to all who want some of it", scenes::the_quota_comes_round, 3000),
+    ("what is retired is freed when nobody reads it", parts::epochs_hold, 3000),
+    ("what is known to be here can be read", parts::known_lists_hold, 6000),
+    ("the gate lets in as many as there are places", parts::the_gate_holds, 3000),
+    ("a quota comes to all who want some of it", parts::the_quota_comes_round, 3000),
 ];
 
 /// How many threads may be put off in a schedule of the second kind.

@@ -5,7 +5,7 @@ use super::report;
 use serde_json::{Value, json};
 
 /// Sees to it that two scene files are the same but for `meta` and the order of sections.
-fn same_sections(place: &Place, one: &str, other: &str) {
+pub fn same_sections(place: &Place, one: &str, other: &str) {
     let sections = |file: &str| {
         let info = report(place, &format!("info {file}"));
         let (file, sections) = (place.read(file), info["file"]["sections"].clone());
