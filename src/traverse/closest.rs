@@ -69,6 +69,12 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
         L::ids_less(self.primitive, L::ids(NONE)).bits()
     }
 
+    /// The triangles found, where [`found`](Self::found) says so.
+    #[inline(always)]
+    pub fn primitives(&self) -> [i32; W] {
+        L::ids_store(self.primitive)
+    }
+
     /// Hit records, with what belongs to the triangles filled in. If weights were not kept, `test` finds
     /// them again.
     #[inline(always)]

@@ -22,6 +22,7 @@
 
 mod accel;
 mod flight;
+mod group;
 mod leaf;
 mod step;
 
@@ -32,7 +33,8 @@ use crate::geometry::triangle::{self, Mode, Test};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{Exit, KdTree, Tree};
 use crate::simd::{Simd, prefetch};
-use flight::{Flight, Group, NONE};
+use flight::{Flight, NONE};
+use group::Group;
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 use step::{END, Waiting, step};
@@ -227,6 +229,11 @@ fn fly<S: Simd, M: Mode, A: Answers>(
         while ahead < rays.len() && free.len() >= 8 {
             let eight = &rays[ahead..rays.len().min(ahead + 8)];
             group.prepare::<S::F8>(eight, tree.bounds(), lines);
+            if A::ANY {
+                group.test_leaf::<S::F8, M, true>(resident);
+            } else {
+                group.test_leaf::<S::F8, M, false>(resident);
+            }
             for (lane, ray) in eight.iter().enumerate() {
                 let number = ahead + lane;
                 if group.odd >> lane & 1 == 1 || !plain {
