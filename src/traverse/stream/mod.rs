@@ -116,50 +116,52 @@ impl Answers for Any<'_> {
     }
 }
 
-/// Places for all rays in flight, and for one that is not to be there.
-type Places = [u16; IN_FLIGHT + 1];
+/// Some of the rays in flight, a bit for each: those that wait for the same work. It stays in a register.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Set(u32);
 
-/// Rays in flight that wait for the same work. (The length stands apart from the array, so that it can be kept in
-/// a register.)
-struct List<'a> {
-    flights: &'a mut Places,
-    len: usize,
-}
+const _: () = assert!(IN_FLIGHT == u32::BITS as usize);
 
-impl<'a> List<'a> {
-    const fn new(flights: &'a mut Places) -> Self {
-        Self { flights, len: 0 }
+impl Set {
+    const NONE: Self = Self(0);
+    const ALL: Self = Self(u32::MAX);
+
+    /// Puts a ray there if it is to be there.
+    #[inline(always)]
+    fn put_if(&mut self, flight: usize, wanted: bool) {
+        self.0 |= u32::from(wanted) << (flight % IN_FLIGHT);
     }
 
-    /// Puts a ray on the list if it is to be there.
+    /// Takes out the first that is there.
     #[inline(always)]
-    fn push_if(&mut self, flight: usize, wanted: bool) {
-        self.flights[self.len] = flight as u16;
-        self.len += usize::from(wanted);
+    fn pop(&mut self) -> Option<usize> {
+        let first = (self.0 != 0).then(|| self.0.trailing_zeros() as usize % IN_FLIGHT);
+        self.0 &= self.0.wrapping_sub(1);
+        first
     }
 
     #[inline(always)]
-    fn get(&self, index: usize) -> usize {
-        usize::from(self.flights[index])
+    const fn len(self) -> usize {
+        self.0.count_ones() as usize
     }
 }
 
 /// What a ray goes on with.
-struct Lists<'a> {
-    lines: List<'a>,
-    leaves: List<'a>,
-    ended: List<'a>,
+struct Ways {
+    lines: Set,
+    leaves: Set,
+    ended: Set,
 }
 
-impl Lists<'_> {
-    /// Puts a ray on the list for the exit that it takes, if it goes on at all, and fetches what it will need.
+impl Ways {
+    /// Sends a ray to the exit that it takes, if it goes on at all, and fetches what it will need.
     #[inline(always)]
     fn route(&mut self, tree: &KdTree, flight: usize, exit: i32, goes_on: bool) {
         let ended = exit == END;
         let exit = Exit(exit);
-        self.lines.push_if(flight, !exit.is_leaf() & goes_on);
-        self.leaves.push_if(flight, exit.is_leaf() & !ended & goes_on);
-        self.ended.push_if(flight, ended & goes_on);
+        self.lines.put_if(flight, !exit.is_leaf() & goes_on);
+        self.leaves.put_if(flight, exit.is_leaf() & !ended & goes_on);
+        self.ended.put_if(flight, ended & goes_on);
         let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
         let record = tree.references().as_ptr().wrapping_add(exit.record());
         prefetch(select_unpredictable(exit.is_leaf(), record, line));
@@ -181,7 +183,7 @@ pub fn trace<S: Simd, M: Mode, A: Answers>(
     // Taken out, not borrowed: a closure would be compiled without the instruction set.
     let mut stacks = STACKS.take();
     stacks.resize(IN_FLIGHT, Waiting::new());
-    fly::<S, M, A>(resident, rays, answers, &mut stacks);
+    fly::<S, M, A>(resident, rays, answers, stacks.first_chunk_mut().expect("as many as rays"));
     STACKS.set(stacks);
 }
 
@@ -190,41 +192,18 @@ fn fly<S: Simd, M: Mode, A: Answers>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
-    stacks: &mut [Waiting],
+    stacks: &mut [Waiting; IN_FLIGHT],
 ) {
     let Resident { tree, records } = *resident;
     let lines = tree.lines();
     let mut flights: Vec<Flight<M::Alone>> = Vec::with_capacity(IN_FLIGHT);
-    let [mut a, mut b, mut c, mut d, mut e] = [[0; IN_FLIGHT + 1]; 5];
-    let mut lists = Lists { lines: List::new(&mut a), leaves: List::new(&mut b), ended: List::new(&mut c) };
-    let (mut triangles, mut hits) = (List::new(&mut d), List::new(&mut e));
-    let mut free: Vec<u16> = (0..IN_FLIGHT as u16).rev().collect();
+    let mut ways = Ways { lines: Set::NONE, leaves: Set::NONE, ended: Set::NONE };
+    let (mut triangles, mut hits) = (Set::NONE, Set::NONE);
+    let mut free = Set::ALL;
     let mut ahead = 0;
     let mut group = Group::new();
     let plain = tree.scale().is_none();
     loop {
-        // Leaves whose records are here.
-        for i in 0..lists.leaves.len {
-            let k = lists.leaves.get(i);
-            let flight = &mut flights[k];
-            let exit = Exit(stacks[k].exits[flight.top as usize]);
-            flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
-            triangles.push_if(k, true);
-        }
-        lists.leaves.len = 0;
-
-        // Lines. Those who go on with a line stay on the list.
-        let lines_here = lists.lines.len;
-        lists.lines.len = 0;
-        for i in 0..lines_here {
-            let k = lists.lines.get(i);
-            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            let top = flight.top as usize;
-            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
-            flight.top = top as u32;
-            lists.route(tree, k, waiting.exits[top], true);
-        }
-
         // New rays in the place of those that have ended, eight at a time.
         while ahead < rays.len() && free.len() >= 8 {
             let eight = &rays[ahead..rays.len().min(ahead + 8)];
@@ -241,9 +220,9 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 } else if group.flies >> lane & 1 == 0 {
                     answers.missed(number);
                 } else {
-                    let k = usize::from(free.pop().expect("as many as rays"));
+                    let k = free.pop().expect("as many as rays");
                     let flight = group.start(lane, ray, number, &mut stacks[k]);
-                    lists.route(tree, k, stacks[k].exits[flight.top as usize], true);
+                    ways.route(tree, k, stacks[k].exits[flight.top as usize], true);
                     if flights.is_empty() {
                         // The others are written over before they are looked at.
                         flights.resize(IN_FLIGHT, flight);
@@ -253,26 +232,24 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             }
             ahead += eight.len();
         }
-        if free.len() == IN_FLIGHT {
+        // (Fixed in length, so that no ray's number has to be checked.)
+        let Some(flights) = flights.first_chunk_mut::<IN_FLIGHT>().filter(|_| free != Set::ALL) else {
             return;
-        }
+        };
 
         // Triangles. Where nothing is found, a ray goes on with the next ones of its leaf, or if that was all, with what
         // is next on its stack.
-        for i in 0..triangles.len {
-            let k = triangles.get(i);
+        while let Some(k) = triangles.pop() {
             let (flight, waiting) = (&mut flights[k], &stacks[k]);
             flight.sift::<S::F8>(records);
             let (found, goes_on) = (flight.leaf.has_found(), flight.leaf.goes_on());
-            hits.push_if(k, found);
+            hits.put_if(k, found);
             flight.top -= u32::from(!found & !goes_on);
-            lists.route(tree, k, waiting.exits[flight.top as usize], !found);
+            ways.route(tree, k, waiting.exits[flight.top as usize], !found);
         }
-        triangles.len = 0;
 
         // Hits.
-        for i in 0..hits.len {
-            let k = hits.get(i);
+        while let Some(k) = hits.pop() {
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let ends = flight.settle::<S::F8>(records) & A::ANY;
             let mut top = flight.top as usize;
@@ -280,21 +257,36 @@ fn fly<S: Simd, M: Mode, A: Answers>(
                 top = waiting.reached::<S::F8>(select_unpredictable(ends, 0, top - 1), flight.tfar);
             }
             flight.top = top as u32;
-            lists.route(tree, k, waiting.exits[top], true);
+            ways.route(tree, k, waiting.exits[top], true);
         }
-        hits.len = 0;
 
         // Rays that have ended.
-        for i in 0..lists.ended.len {
-            let k = lists.ended.get(i);
+        while let Some(k) = ways.ended.pop() {
             let flight = &flights[k];
             if flight.primitive == NONE {
                 answers.missed(flight.ray as usize);
             } else {
                 answers.found::<M>(resident, flight);
             }
-            free.push(k as u16);
+            free.put_if(k, true);
         }
-        lists.ended.len = 0;
+
+        // Leaves whose records are here.
+        while let Some(k) = ways.leaves.pop() {
+            let flight = &mut flights[k];
+            let exit = Exit(stacks[k].exits[flight.top as usize]);
+            flight.leaf.fetch::<S::F8, _>(tree.references(), exit.record(), records);
+            triangles.put_if(k, true);
+        }
+
+        // Lines. Those who go on with a line are there again in the next round.
+        let mut here = std::mem::replace(&mut ways.lines, Set::NONE);
+        while let Some(k) = here.pop() {
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let top = flight.top as usize;
+            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            flight.top = top as u32;
+            ways.route(tree, k, waiting.exits[top], true);
+        }
     }
 }
