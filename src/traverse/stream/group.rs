@@ -11,8 +11,8 @@
 //! the wall, and then what is left of the line begins where the ray does.
 //!
 //! **If they end up in one leaf, they are a packet there**: each of its triangles is tested against all eight rays at
-//! once, and is fetched once. Only then each goes its own way. That leaf is the one of all leaves that most of them have in common;
-//! to go on together in what lies around it, with what few rays meet put on their stacks, was slower than to part.
+//! once, and is fetched once. Only then each goes its own way. To go on together in what lies around that leaf, with what
+//! few rays meet put on their own stacks, was slower than to part: one packet waits for itself, a stream has other rays.
 
 use super::flight::{Flight, NONE};
 use super::leaf::Leaf;
