@@ -123,14 +123,7 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
         tree.enter_leaf(node);
         let primitives = tree.primitives(node);
         if !primitives.is_empty() {
-            let live = interval.live();
-            for &primitive in primitives {
-                let mut candidate = test.test(tree.record_of(primitive), live);
-                if T::SIFTS {
-                    sift::<W, L, T, M>(tree, &mut candidate, primitive, [tnear, closest.t], live);
-                }
-                closest.take::<ANY>(&candidate, primitive, tnear, live, true);
-            }
+            test_leaf::<W, L, T, M, ANY>(tree, primitives, test, tnear, interval.live(), closest, true);
         }
 
         // Take up the next subtree that some lane can still find something nearer in. Its
@@ -143,5 +136,25 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
                 break;
             }
         }
+    }
+}
+
+/// Tests a leaf's triangles against the lanes in `live`; `weights` says whether the hits' are kept.
+#[inline(always)]
+pub fn test_leaf<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: bool>(
+    tree: &T,
+    primitives: &[u32],
+    test: &M::Test<W, L>,
+    tnear: L,
+    live: L::Mask,
+    closest: &mut Closest<W, L>,
+    weights: bool,
+) {
+    for &primitive in primitives {
+        let mut candidate = test.test(tree.record_of(primitive), live);
+        if T::SIFTS {
+            sift::<W, L, T, M>(tree, &mut candidate, primitive, [tnear, closest.t], live);
+        }
+        closest.take::<ANY>(&candidate, primitive, tnear, live, weights);
     }
 }

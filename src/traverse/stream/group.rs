@@ -22,14 +22,15 @@ use crate::geometry::{Aabb, Ray};
 use crate::kdtree::{Exit, Line};
 use crate::simd::{Eight, Mask};
 use crate::traverse::closest::Closest;
+use crate::traverse::packet::test_leaf;
 use crate::traverse::range::{LEAST, LIMIT};
 use crate::traverse::records::Resident;
-use crate::traverse::walk::{FLATTEST, MARGIN};
+use crate::traverse::walk::{FLATTEST, MARGIN, load3};
 
 /// Lines that eight rays can go through together.
 const CHAIN: usize = crate::kdtree::MAX_DEPTH.div_ceil(3);
 
-/// The exit to where nothing is.
+/// An exit to where nothing is. (There are others in a line; 0 is the way to its root here.)
 const NOWHERE: i32 = 1;
 
 /// Rays that are worth a packet's test of the leaf that they start in.
@@ -100,7 +101,7 @@ impl Group {
         }
         let present = (1u32 << rays.len().min(8)) - 1;
         let zero = L::splat(0.0);
-        let (origin, direction) = (load::<L>(&self.origin), load::<L>(&self.direction));
+        let (origin, direction) = (load3::<8, L>(&self.origin), load3::<8, L>(&self.direction));
         let longest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
         let (tnear, tfar) = (L::load(&self.tnear), L::load(&self.closest));
 
@@ -206,18 +207,19 @@ impl Group {
     #[inline(always)]
     pub fn test_leaf<L: Eight, M: Mode, const ANY: bool>(&mut self, resident: &Resident<'_, M::Record>) {
         let exit = Exit(self.exit);
-        let here = L::load(&self.tmin).le(L::load(&self.last)).bits() & self.flies;
-        if self.len == 0 || !exit.is_leaf() || here.count_ones() < FEW {
+        if !exit.is_leaf() {
             return;
         }
-        let test = M::Test::<8, L>::new(&load(&self.origin), &load(&self.direction), self.flies);
+        let here = L::load(&self.tmin).le(L::load(&self.last)).bits() & self.flies;
+        if here.count_ones() < FEW {
+            return;
+        }
+        let test = M::Test::<8, L>::new(&load3(&self.origin), &load3(&self.direction), self.flies);
         let (tnear, here) = (L::load(&self.tnear), L::mask_from_bits(here));
         let mut closest = Closest::<8, L>::new(L::load(&self.closest));
         let words = &resident.tree.references()[exit.record()..];
-        for &primitive in &words[1..][..words[0] as usize] {
-            let candidate = test.test(&resident.records[primitive as usize], here);
-            closest.take::<ANY>(&candidate, primitive, tnear, here, false);
-        }
+        let primitives = &words[1..][..words[0] as usize];
+        test_leaf::<8, L, _, M, ANY>(resident, primitives, &test, tnear, here, &mut closest, false);
         (self.closest, self.primitive) = (closest.t.store(), closest.primitives());
         self.exit = NOWHERE;
     }
@@ -259,7 +261,85 @@ impl Group {
     }
 }
 
-#[inline(always)]
-fn load<L: Eight>(rows: &[[f32; 8]; 3]) -> [L; 3] {
-    [L::load(&rows[0]), L::load(&rows[1]), L::load(&rows[2])]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Hit;
+    use crate::geometry::triangle::Watertight;
+    use crate::kdtree::{BuildParams, KdTree, Tree};
+    use crate::mesh::Mesh;
+    use crate::simd::{Isa, Simd, Task};
+    use crate::traverse::{Accel, Kernel};
+    use glam::Vec3;
+
+    /// Hills of some two thousand triangles.
+    fn hills() -> Mesh {
+        let side = 33u32;
+        let point = |i: u32| {
+            let (x, y) = ((i % side) as f32 / 32.0, (i / side) as f32 / 32.0);
+            Vec3::new(x, y, 0.05 * (20.0 * x).sin() * (17.0 * y).cos())
+        };
+        let corner = |x: u32, y: u32| y * side + x;
+        let square = |i: u32| {
+            let (x, y) = (i % (side - 1), i / (side - 1));
+            let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x, y + 1), corner(x + 1, y + 1)];
+            [[a, b, c], [b, d, c]]
+        };
+        let triangles = (0..(side - 1) * (side - 1)).flat_map(square).collect();
+        Mesh { positions: (0..side * side).map(point).collect(), triangles, ..Mesh::default() }
+    }
+
+    /// Eights of rays that start near one another above, on and below the hills, and go everywhere; some of them end soon.
+    fn eights() -> Vec<Ray> {
+        let mut state = 0.0f64;
+        let mut number = move || {
+            state = (state + 0.618_033_988_749_895).fract();
+            (state * 2.0 - 1.0) as f32
+        };
+        let mut point = move || Vec3::new(number(), number(), number());
+        let mut eight = |i: usize| {
+            let place = (point() * Vec3::new(0.5, 0.5, 0.06)) + Vec3::new(0.5, 0.5, 0.0);
+            let apart = [0.0, 1e-4, 1e-2][i % 3];
+            let end = [f32::INFINITY, 0.04][i / 3 % 2];
+            std::array::from_fn::<Ray, 8, _>(|_| Ray::segment(place + point() * apart, point(), 0.0, end))
+        };
+        (0..600).flat_map(&mut eight).collect()
+    }
+
+    /// How many hits eights of rays find before they part.
+    struct Together<'a>(&'a KdTree, &'a [Ray]);
+
+    impl Task for Together<'_> {
+        type Output = usize;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> usize {
+            let Self(tree, rays) = self;
+            let resident = Resident { tree, records: tree.triangles() };
+            let (mut group, mut found) = (Group::new(), 0);
+            for eight in rays.chunks(8) {
+                group.prepare::<S::F8>(eight, resident.tree.bounds(), tree.lines());
+                group.test_leaf::<S::F8, Watertight, false>(&resident);
+                found += group.primitive.iter().filter(|&&id| id != NONE as i32).count();
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn rays_that_start_in_one_leaf_find_what_each_finds_alone() {
+        let (mesh, rays) = (hills(), eights());
+        for isa in Isa::available() {
+            let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds").with_isa(isa);
+            let together = accel.chosen().run(Together(accel.tree(), &rays));
+            assert!(together > 500, "{together} of {} are found by packets on {isa}", rays.len());
+            let (mut alone, mut hits) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+            accel.intersect_many(Kernel::Single, &rays, &mut alone);
+            accel.intersect_many(Kernel::Stream, &rays, &mut hits);
+            assert_eq!(hits, alone, "{isa}");
+            let mut occluded = vec![false; rays.len()];
+            accel.occluded_many(Kernel::Stream, &rays, &mut occluded);
+            assert!(occluded.iter().zip(&alone).all(|(&occluded, hit)| occluded == hit.is_hit()), "{isa}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! One ray against the triangles of a leaf, eight at a time.
 //!
 //! The mode sifts eight triangles at once, and what it finds is kept with the ray. Most eights hold nothing: those
-//! rays go on at once, by arithmetic alone. The others stand in a list of their own, in which every ray has
+//! rays go on at once, by arithmetic alone. The others stand in a set of their own, in which every ray has
 //! something to look at: what is in doubt goes through the mode's own test, and the nearest is taken. So hits are
 //! what packets find, bit for bit, and no branch depends on whether a triangle is hit.
 
