@@ -234,7 +234,10 @@ mod tests {
             ("[render]\ntiles = 3", "p.toml: line 2: unknown field `tiles`"),
             ("[rander]\ntile = 3", "p.toml: line 1: unknown field `rander`"),
             ("[build]\nbin = 3", "p.toml: line 2: unknown field `bin`"),
-            ("[render]\npacket = 5", "p.toml: line 2: packet = 5 is not one of 1, 4, 8, 16, 64, 256"),
+            (
+                "[render]\npacket = 5",
+                "p.toml: line 2: packet = 5 is not one of 1, 4, 8, 16, 64, 256, 1024, 4096",
+            ),
             ("[render]\ntile = 0", "p.toml: render.tile: 0 is not"),
             ("[render]\ntile = -1", "p.toml: line 2: invalid value"),
             ("[render]\nthreads = 99999", "p.toml: render.threads: 99999 are too many"),

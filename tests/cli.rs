@@ -61,7 +61,7 @@ fn render_writes_the_picture_and_says_what_it_did() {
         "shadow ",
         "total ",
         "2 threads",
-        "beams of 256",
+        "beams of 1024",
         "40x30",
     ] {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
@@ -365,7 +365,7 @@ mod bad_input {
             ("--tile 1025", "--tile: 1025"),
             ("--threads 1025", "--threads: 1025"),
             ("--accuracy precise", "--accuracy: \"precise\" is not one of fast, watertight, exact"),
-            ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256"),
+            ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256, 1024, 4096"),
             ("--orbit 0", "--orbit: 0"),
             ("--orbit 4 --step inf", "--step: inf"),
             ("--camera eye=1,2,3", "--camera: at is missing"),

@@ -69,7 +69,7 @@ pub struct Args {
     /// Worker threads; 0 for all processors [default: the profile's]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
-    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream) or 256 [default: what is quickest, lot by lot]
+    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream), 256 or 1024 (beams) or 4096 (lists) [default: what is quickest, lot by lot]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     #[command(flatten)]
@@ -177,7 +177,7 @@ impl Args {
     fn kernel(&self) -> Result<Option<Kernel>> {
         let of_width = |width| {
             Kernel::of_width(width).ok_or_else(|| {
-                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256"))
+                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256, 1024, 4096"))
             })
         };
         self.packet.map(of_width).transpose()

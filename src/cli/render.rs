@@ -63,7 +63,7 @@ pub struct Args {
     /// Keep each worker on one processor
     #[arg(long)]
     pin: bool,
-    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream) or 256 (a beam) [default: the profile's]
+    /// Rays that are traced together: 1, 4, 8, 16, 64 (a stream), 256 or 1024 (beams) or 4096 (lists) [default: the profile's]
     #[arg(long, value_name = "N")]
     packet: Option<usize>,
     /// Side of a tile in pixels [default: the profile's]
@@ -323,7 +323,7 @@ impl Args {
         let packet = match self.packet {
             None => profile.render.packet,
             Some(width) => Kernel::of_width(width).ok_or_else(|| {
-                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256"))
+                Error::option("--packet", format!("{width} is not one of 1, 4, 8, 16, 64, 256, 1024, 4096"))
             })?,
         };
         let tuning = Tuning {

@@ -242,8 +242,11 @@ impl<'a, S: Surface> Renderer<'a, S> {
             Kernel::Packet4 => self.drawn_with(Calls::<4>::PACKETS, wanted),
             Kernel::Packet8 => self.drawn_with(Calls::<8>::PACKETS, wanted),
             Kernel::Packet16 => self.drawn_with(Calls::<16>::PACKETS, wanted),
-            Kernel::Stream => self.drawn_with(Calls::STREAM, wanted),
-            Kernel::Tile => self.drawn_with(Calls::TILES, wanted),
+            // A scene that is in memory in part has neither lists nor wide beams, and gives its turns by squares.
+            Kernel::Filter if self.accel.cached().is_none() => self.drawn_with(Calls::LISTS, wanted),
+            Kernel::Stream | Kernel::Filter => self.drawn_with(Calls::STREAM, wanted),
+            Kernel::WideTile if self.accel.cached().is_none() => self.drawn_with(Calls::LOTS, wanted),
+            Kernel::Tile | Kernel::WideTile => self.drawn_with(Calls::TILES, wanted),
         }
     }
 
@@ -389,7 +392,11 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let RenderSettings { size, ref tuning, .. } = self.settings;
         let view = |camera: &Camera| camera.view(size.width, size.height);
         let next = self.course.as_ref().and_then(|course| course.after(camera));
-        Seen { view: view(camera), next: next.as_ref().map(view), in_beams: tuning.packet == Kernel::Tile }
+        Seen {
+            view: view(camera),
+            next: next.as_ref().map(view),
+            in_beams: matches!(tuning.packet, Kernel::Tile | Kernel::WideTile),
+        }
     }
 
     /// What looks ahead while some tiles are rendered, if anything does.

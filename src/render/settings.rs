@@ -93,8 +93,9 @@ impl FromStr for Size {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tuning {
-    /// Rays that are traced together: 1, 4, 8, 16, 64 or 256. 64 are a stream, each ray alone. With 256, the squares of a picture
-    /// go together where that is quicker, and by packets of 16 elsewhere, found out while rendering.
+    /// Rays that are traced together: 1, 4, 8, 16, 64, 256, 1024 or 4096. 64 are a stream, each ray alone, 4096 are lists
+    /// of rays. With 256, the squares of a picture go together where that is quicker, and by packets of 16 or 8
+    /// elsewhere, found out while rendering; with 1024, so do four of them.
     #[serde(with = "packet_width")]
     pub packet: Kernel,
     /// Side of a tile in pixels, 1 to 1024. Smaller tiles share the work more evenly, larger ones
@@ -109,7 +110,7 @@ pub struct Tuning {
 
 impl Default for Tuning {
     fn default() -> Self {
-        Self { packet: Kernel::Tile, tile: 32, threads: 0, pin: false }
+        Self { packet: Kernel::WideTile, tile: 32, threads: 0, pin: false }
     }
 }
 
@@ -151,10 +152,9 @@ mod packet_width {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Kernel, D::Error> {
         let width = i64::deserialize(deserializer)?;
-        usize::try_from(width)
-            .ok()
-            .and_then(Kernel::of_width)
-            .ok_or_else(|| D::Error::custom(format!("packet = {width} is not one of 1, 4, 8, 16, 64, 256")))
+        usize::try_from(width).ok().and_then(Kernel::of_width).ok_or_else(|| {
+            D::Error::custom(format!("packet = {width} is not one of 1, 4, 8, 16, 64, 256, 1024, 4096"))
+        })
     }
 }
 

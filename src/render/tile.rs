@@ -18,6 +18,12 @@ use std::time::Instant;
 /// nearest caches.
 pub(super) const SQUARE: u32 = 16;
 
+/// Side of a lot of such squares, which wide beams take at once.
+const LOT: u32 = 2 * SQUARE;
+
+/// Squares in a lot.
+const SQUARES: usize = ((LOT / SQUARE) * (LOT / SQUARE)) as usize;
+
 /// So many squares lie beside one another over so many pixels.
 pub(super) const fn squares(pixels: u32) -> usize {
     pixels.div_ceil(SQUARE) as usize
@@ -26,12 +32,14 @@ pub(super) const fn squares(pixels: u32) -> usize {
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
 
-/// Answers, packet by packet, what was asked of their lanes at a place.
-type Call<const W: usize, A> = fn(&mut Dispatch, &Accel, Place<'_>, &[RayPacket<W>], &[u32], &mut [A]);
+/// Answers, packet by packet, what was asked of their lanes at the places of their squares.
+type Call<const W: usize, A> = fn(&mut Dispatch, &Accel, &[Place<'_>], &[RayPacket<W>], &[u32], &mut [A]);
 
 /// How a square's packets are traced. What was learnt from the squares before is there for those who can
 /// use it.
 pub(super) struct Calls<const W: usize> {
+    /// Side of the square of pixels whose packets come at once: [`SQUARE`] or [`LOT`].
+    side: u32,
     /// The closest hits of the lanes given with each packet.
     intersect: Call<W, HitPacket<W>>,
     /// Which of those lanes hit anything.
@@ -44,6 +52,7 @@ where
 {
     /// Packet by packet.
     pub const PACKETS: Self = Self {
+        side: SQUARE,
         intersect: |_, accel, _, rays, active, hits| accel.intersect_packets(rays, active, hits),
         occluded: |_, accel, _, rays, active, occluded| accel.occluded_packets(rays, active, occluded),
     };
@@ -52,28 +61,56 @@ where
 impl Calls<1> {
     /// All rays of a square in one stream.
     pub const STREAM: Self = Self {
+        side: SQUARE,
         intersect: |_, accel, _, rays, active, hits| {
-            let mut found = [Hit::MISS; BATCH];
-            let found = &mut found[..rays.len()];
-            accel.intersect_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
-            for (packet, hit) in hits.iter_mut().zip(found) {
-                *packet = HitPacket::of_hit(hit);
-            }
+            intersect_each(accel, Kernel::Stream, rays, active, hits)
         },
-        occluded: |_, accel, _, rays, active, occluded| {
-            let mut found = [false; BATCH];
-            let found = &mut found[..rays.len()];
-            accel.occluded_many(Kernel::Stream, &unpacked(rays, active)[..rays.len()], found);
-            for (lanes, &found) in occluded.iter_mut().zip(&*found) {
-                *lanes = u32::from(found);
-            }
+        occluded: |_, accel, _, rays, active, found| {
+            occluded_each(accel, Kernel::Stream, rays, active, found)
+        },
+    };
+
+    /// All rays of a lot in lists.
+    pub const LISTS: Self = Self {
+        side: LOT,
+        intersect: |_, accel, _, rays, active, hits| {
+            intersect_each(accel, Kernel::Filter, rays, active, hits)
+        },
+        occluded: |_, accel, _, rays, active, found| {
+            occluded_each(accel, Kernel::Filter, rays, active, found)
         },
     };
 }
 
+/// Traces rays one by one, as the kernel sees it.
+fn intersect_each(
+    accel: &Accel,
+    kernel: Kernel,
+    rays: &[RayPacket<1>],
+    active: &[u32],
+    hits: &mut [HitPacket<1>],
+) {
+    let mut found = [Hit::MISS; SQUARES * BATCH];
+    let found = &mut found[..rays.len()];
+    accel.intersect_many(kernel, &unpacked(rays, active)[..rays.len()], found);
+    for (packet, hit) in hits.iter_mut().zip(found) {
+        *packet = HitPacket::of_hit(hit);
+    }
+}
+
+/// The same for any hit.
+fn occluded_each(accel: &Accel, kernel: Kernel, rays: &[RayPacket<1>], active: &[u32], occluded: &mut [u32]) {
+    let mut found = [false; SQUARES * BATCH];
+    let found = &mut found[..rays.len()];
+    accel.occluded_many(kernel, &unpacked(rays, active)[..rays.len()], found);
+    for (lanes, &found) in occluded.iter_mut().zip(&*found) {
+        *lanes = u32::from(found);
+    }
+}
+
 /// Rays one by one; those that do not count look for nothing.
-fn unpacked(rays: &[RayPacket<1>], active: &[u32]) -> [Ray; BATCH] {
-    let mut all = [RayPacket::<1>::empty().get(0); BATCH];
+fn unpacked(rays: &[RayPacket<1>], active: &[u32]) -> [Ray; SQUARES * BATCH] {
+    let mut all = [RayPacket::<1>::empty().get(0); SQUARES * BATCH];
     for ((ray, packet), &active) in all.iter_mut().zip(rays).zip(active) {
         if active != 0 {
             *ray = packet.get(0);
@@ -84,7 +121,11 @@ fn unpacked(rays: &[RayPacket<1>], active: &[u32]) -> [Ray; BATCH] {
 
 impl Calls<16> {
     /// All rays of a square together where that is quicker.
-    pub const TILES: Self = Self { intersect: Dispatch::intersect, occluded: Dispatch::occluded };
+    pub const TILES: Self =
+        Self { side: SQUARE, intersect: Dispatch::intersect, occluded: Dispatch::occluded };
+
+    /// All rays of a lot, likewise.
+    pub const LOTS: Self = Self { side: LOT, ..Self::TILES };
 }
 
 /// All that a tile's rendering reads.
@@ -139,7 +180,7 @@ pub(super) struct Scratch<const W: usize> {
 impl<const W: usize> Scratch<W> {
     /// Empty, with what has been learnt before about kernels.
     pub fn new(dispatch: Dispatch) -> Self {
-        let count = BATCH / W;
+        let count = SQUARES * BATCH / W;
         Self {
             blocks: vec![Block { x: 0, y: 0 }; count],
             active: vec![0; count],
@@ -198,8 +239,9 @@ where
         let mut pixels = pixels;
         let tile = pixels.tile;
         let mut is_complete = true;
-        for y in (0..tile.height).step_by(SQUARE as usize) {
-            for x in (0..tile.width).step_by(SQUARE as usize) {
+        let side = self.calls.side as usize;
+        for y in (0..tile.height).step_by(side) {
+            for x in (0..tile.width).step_by(side) {
                 // A scene that is in memory in part gives its turns by squares.
                 let _session = self.accel.cached().map(|cached| cached.session());
                 let Some(stand_in) = &self.stand_in else {
@@ -219,14 +261,17 @@ where
         is_complete
     }
 
-    /// Renders the square of a tile at a place in it.
+    /// Renders the square of a tile at a place in it, or the lot.
     fn square(&self, scratch: &mut Scratch<W>, pixels: &mut TilePixels<'_>, (x, y): (u32, u32)) {
-        let used = scratch.cover(&pixels.tile, x, y);
+        let used = scratch.cover(&pixels.tile, x, y, self.calls.side);
         // Where squares of tiles do not lie on the grid of the picture, two may have one number.
         let [column, row] = [pixels.tile.x + x, pixels.tile.y + y].map(|place| (place / SQUARE) as usize);
-        let place = self.places.at(row * self.columns + column);
+        let places: [Place<'_>; SQUARES] = std::array::from_fn(|square| {
+            let (right, down) = (square % 2, square / 2);
+            self.places.at((row + down) * self.columns + column + right)
+        });
         for sample in 0..self.samples {
-            self.sample(scratch, used, sample, place, pixels);
+            self.sample(scratch, used, sample, &places, pixels);
         }
         self.write(scratch, used, pixels);
     }
@@ -237,14 +282,14 @@ where
         scratch: &mut Scratch<W>,
         used: usize,
         sample: u32,
-        place: Place<'_>,
+        places: &[Place<'_>],
         pixels: &mut TilePixels<'_>,
     ) {
         let start = Stopwatch::start(self.accel);
         let active = &scratch.active[..used];
         self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
         let (rays, hits) = (&scratch.rays[..used], &mut scratch.hits[..used]);
-        (self.calls.intersect)(&mut scratch.dispatch, self.accel, place, rays, active, hits);
+        (self.calls.intersect)(&mut scratch.dispatch, self.accel, places, rays, active, hits);
         scratch.camera.rays += count(active);
         scratch.camera.time += start.elapsed(self.accel);
 
@@ -257,7 +302,7 @@ where
         let start = Stopwatch::start(self.accel);
         let lit = &scratch.lit[..used];
         let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
-        (self.calls.occluded)(&mut scratch.dispatch, self.accel, place, rays, lit, occluded);
+        (self.calls.occluded)(&mut scratch.dispatch, self.accel, places, rays, lit, occluded);
         self.accel.chosen().run(AddKey { shades: &mut scratch.shades[..used], lit, occluded });
         scratch.shadow.rays += count(lit);
         scratch.shadow.time += start.elapsed(self.accel);
@@ -336,20 +381,32 @@ impl<const W: usize> Task for CameraRays<'_, W> {
 }
 
 impl<const W: usize> Scratch<W> {
-    /// Lays blocks over the square of a tile at (`x`, `y`), and says how many it takes.
-    fn cover(&mut self, tile: &Tile, x: u32, y: u32) -> usize {
+    /// Lays blocks over the square of a tile at (`x`, `y`), and says how many it takes. They come in Morton order, four
+    /// by four pixels at a time, so that each four such quarters and each sixteen are squares, too.
+    fn cover(&mut self, tile: &Tile, x: u32, y: u32, side: u32) -> usize {
         let (width, height) = block_size(W);
         let mut used = 0;
-        for y in (y..tile.height.min(y + SQUARE)).step_by(height as usize) {
-            for x in (x..tile.width.min(x + SQUARE)).step_by(width as usize) {
-                self.active[used] = lanes_inside::<W>(tile, x, y);
-                self.blocks[used] = Block { x, y };
-                self.shades[used].sum = [[0.0; W]; 3];
-                used += 1;
+        for cell in 0..(side / CELL) * (side / CELL) {
+            let (left, top) = (x + CELL * every_second_bit(cell), y + CELL * every_second_bit(cell >> 1));
+            for y in (top..tile.height.min(top + CELL)).step_by(height as usize) {
+                for x in (left..tile.width.min(left + CELL)).step_by(width as usize) {
+                    self.active[used] = lanes_inside::<W>(tile, x, y);
+                    self.blocks[used] = Block { x, y };
+                    self.shades[used].sum = [[0.0; W]; 3];
+                    used += 1;
+                }
             }
         }
         used
     }
+}
+
+/// Side of the square of pixels that the largest packet covers.
+const CELL: u32 = 4;
+
+/// Bits 0, 2 and 4, moved together.
+const fn every_second_bit(i: u32) -> u32 {
+    i & 1 | i >> 1 & 2 | i >> 2 & 4
 }
 
 /// How many lanes are set.
@@ -368,14 +425,14 @@ fn place_of<const W: usize>(x: u32, y: u32, lane: usize) -> (u32, u32) {
 mod tests {
     use super::*;
 
-    fn covered<const W: usize>(tile: Tile) {
+    fn covered<const W: usize>(tile: Tile, side: u32) {
         let mut seen = vec![0; tile.pixels()];
         let (width, height) = block_size(W);
         assert_eq!((width * height) as usize, W);
         let mut scratch = Scratch::<W>::new(Dispatch::default());
-        for y in (0..tile.height).step_by(SQUARE as usize) {
-            for x in (0..tile.width).step_by(SQUARE as usize) {
-                let used = scratch.cover(&tile, x, y);
+        for y in (0..tile.height).step_by(side as usize) {
+            for x in (0..tile.width).step_by(side as usize) {
+                let used = scratch.cover(&tile, x, y, side);
                 for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
                     for lane in lanes(active) {
                         let (x, y) = place_of::<W>(block.x, block.y, lane);
@@ -391,10 +448,12 @@ mod tests {
     fn blocks_cover_tiles_of_any_size() {
         for (width, height) in [(1, 1), (4, 4), (5, 3), (32, 32), (31, 2), (3, 9)] {
             let tile = Tile { x: 7, y: 11, width, height };
-            covered::<1>(tile);
-            covered::<4>(tile);
-            covered::<8>(tile);
-            covered::<16>(tile);
+            for side in [SQUARE, LOT] {
+                covered::<1>(tile, side);
+                covered::<4>(tile, side);
+                covered::<8>(tile, side);
+                covered::<16>(tile, side);
+            }
         }
     }
 }

@@ -216,7 +216,48 @@ macro_rules! fold_rows {
     }};
 }
 
+/// Four vectors folded into one, four lanes to one.
+macro_rules! fold_fours {
+    ($vectors:expr, $of:ident) => {{
+        let [a, b, c, d] = $vectors;
+        // Within quarters: of each vector, two numbers, then one.
+        let ab = avx512!($of(_mm512_shuffle_ps::<0x88>(a.0, b.0), _mm512_shuffle_ps::<0xdd>(a.0, b.0)));
+        let cd = avx512!($of(_mm512_shuffle_ps::<0x88>(c.0, d.0), _mm512_shuffle_ps::<0xdd>(c.0, d.0)));
+        let folded = avx512!($of(_mm512_shuffle_ps::<0x88>(ab, cd), _mm512_shuffle_ps::<0xdd>(ab, cd)));
+        // A quarter holds a number of each vector.
+        let order = avx512!(_mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15));
+        Self(avx512!(_mm512_permutexvar_ps(order, folded)))
+    }};
+}
+
 impl Sixteen for F32x16 {
+    #[inline(always)]
+    fn ids_load(ids: &[i32; 16]) -> __m512i {
+        avx512!(_mm512_loadu_si512(ids.as_ptr().cast()))
+    }
+    // Closed up in the register, and stored whole: stores of single lanes are slow.
+    #[inline(always)]
+    fn compact(self, bits: u32, to: &mut [f32; 16]) {
+        avx512!(_mm512_storeu_ps(to.as_mut_ptr(), _mm512_maskz_compress_ps(bits as u16, self.0)));
+    }
+    #[inline(always)]
+    fn ids_compact(ids: __m512i, bits: u32, to: &mut [i32; 16]) {
+        avx512!(_mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(bits as u16, ids)));
+    }
+    #[inline(always)]
+    fn least_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_fours!(vectors, _mm512_min_ps)
+    }
+    #[inline(always)]
+    fn greatest_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_fours!(vectors, _mm512_max_ps)
+    }
+    #[inline(always)]
+    fn spread(self, part: usize) -> Self {
+        let first = avx512!(_mm512_set1_epi32(4 * part as i32));
+        let order = avx512!(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3));
+        Self(avx512!(_mm512_permutexvar_ps(_mm512_add_epi32(first, order), self.0)))
+    }
     #[inline(always)]
     fn least_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
         fold_rows!(rows, counted, f32::INFINITY, _mm512_min_ps)

@@ -12,6 +12,7 @@
 //! alone may fuse: it is for bounds.
 
 mod branch;
+mod dense;
 mod eight;
 mod isa;
 mod lanes;
@@ -28,6 +29,7 @@ mod avx512;
 mod pair;
 
 pub use branch::stay_a_branch;
+pub use dense::Dense;
 pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};

@@ -149,6 +149,11 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
 
 impl<L: Eight> Sixteen for Pair<L> {
     #[inline(always)]
+    fn ids_load(ids: &[i32; 16]) -> Self::Ids {
+        let [low, high] = ids.as_chunks::<8>().0 else { unreachable!("sixteen are two eights") };
+        Pair(L::ids_load(low), L::ids_load(high))
+    }
+    #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
         let [a, b, c, d] = half_of_fours::<L>(fours, 0);
         let [e, f, g, h] = half_of_fours::<L>(fours, 8);

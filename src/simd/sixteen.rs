@@ -16,6 +16,31 @@ pub trait Sixteen: Lanes<16> {
         [Self::load(&columns[0]), Self::load(&columns[1]), Self::load(&columns[2]), Self::load(&columns[3])]
     }
 
+    /// Lane `i` is `ids[i]`.
+    fn ids_load(ids: &[i32; 16]) -> Self::Ids;
+
+    /// Writes the lanes whose bit is set in `bits` one behind the other. What follows them in `to` means nothing.
+    #[inline(always)]
+    fn compact(self, bits: u32, to: &mut [f32; 16]) {
+        let values = self.store();
+        let mut next = 0;
+        for lane in 0..16 {
+            to[next & 15] = values[lane];
+            next += (bits >> lane & 1) as usize;
+        }
+    }
+
+    /// The same of ids.
+    #[inline(always)]
+    fn ids_compact(ids: Self::Ids, bits: u32, to: &mut [i32; 16]) {
+        let ids = Self::ids_store(ids);
+        let mut next = 0;
+        for lane in 0..16 {
+            to[next & 15] = ids[lane];
+            next += (bits >> lane & 1) as usize;
+        }
+    }
+
     /// The least number of each row among those whose bit is set in `counted`: that of row `i` in lane `i`, infinity
     /// if there is none. None that counts may be NaN.
     #[inline(always)]
@@ -38,4 +63,41 @@ pub trait Sixteen: Lanes<16> {
         }
         Self::load(&greatest)
     }
+
+    /// Four vectors' sixty-four lanes, four to one: the least of lanes `4 j` to `4 j + 3` of vector `i` in lane
+    /// `4 i + j`. No lane may be NaN.
+    #[inline(always)]
+    fn least_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_fours(vectors, |a, b| if b < a { b } else { a })
+    }
+
+    /// The greatest likewise.
+    #[inline(always)]
+    fn greatest_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_fours(vectors, |a, b| if b > a { b } else { a })
+    }
+
+    /// Four lanes, each in four: lane `4 part + j` in the lanes `4 j` to `4 j + 3`. `part` is less than 4.
+    #[inline(always)]
+    fn spread(self, part: usize) -> Self {
+        let values = self.store();
+        let mut spread = [0.0; 16];
+        for lane in 0..16 {
+            spread[lane] = values[(4 * part + lane / 4) & 15];
+        }
+        Self::load(&spread)
+    }
+}
+
+#[inline(always)]
+fn fold_fours<L: Sixteen>(vectors: &[L; 4], of: impl Fn(f32, f32) -> f32) -> L {
+    let mut folded = [0.0; 16];
+    for i in 0..4 {
+        let values = vectors[i].store();
+        for j in 0..4 {
+            let [a, b, c, d] = [values[4 * j], values[4 * j + 1], values[4 * j + 2], values[4 * j + 3]];
+            folded[4 * i + j] = of(of(a, b), of(c, d));
+        }
+    }
+    L::load(&folded)
 }

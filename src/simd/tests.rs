@@ -145,6 +145,39 @@ fn check_sixteen<L: Sixteen>() {
         assert_eq!(L::least_of_rows(&rows, &counted).store(), least);
         assert_eq!(L::greatest_of_rows(&rows, &counted).store(), greatest);
     }
+    let scrambled: [[f32; 16]; 4] =
+        std::array::from_fn(|i| std::array::from_fn(|lane| ((16 * i + lane) * 29 % 64) as f32 - 20.0));
+    let vectors = scrambled.each_ref().map(L::load);
+    let four = |lane: usize| &scrambled[lane / 4][lane % 4 * 4..][..4];
+    let least = std::array::from_fn(|lane| four(lane).iter().copied().fold(f32::INFINITY, f32::min));
+    let greatest = std::array::from_fn(|lane| four(lane).iter().copied().fold(f32::NEG_INFINITY, f32::max));
+    assert_eq!(L::least_of_fours(&vectors).store(), least);
+    assert_eq!(L::greatest_of_fours(&vectors).store(), greatest);
+    for part in 0..4 {
+        let spread = std::array::from_fn(|lane| scrambled[0][4 * part + lane / 4]);
+        assert_eq!(vectors[0].spread(part).store(), spread);
+    }
+}
+
+/// Rows here and there become columns, and what does not count is closed up.
+#[inline(always)]
+fn check_dense<const W: usize, L: Dense<W>>() {
+    let rows: [[f32; 4]; W] = std::array::from_fn(|j| [0.0, 100.0, 200.0, 300.0].map(|x| x + j as f32));
+    let scattered: [&[f32; 4]; W] = std::array::from_fn(|j| &rows[(j * 5 + 2) % W]);
+    for (i, column) in L::columns(&scattered).into_iter().enumerate() {
+        assert_eq!(column.store(), std::array::from_fn(|j| scattered[j][i]));
+    }
+    let (numbers, ids) =
+        (std::array::from_fn(|i| i as f32 - 3.5), std::array::from_fn(|i| 70 - 9 * i as i32));
+    for turn in 0..256u32 {
+        let bits = turn.wrapping_mul(0x9e37_79b9) >> (32 - W);
+        let (mut closed_up, mut closed_up_ids) = ([0.0; W], [0; W]);
+        L::load(&numbers).close_up(bits, &mut closed_up);
+        L::close_up_ids(L::ids_of(&ids), bits, &mut closed_up_ids);
+        for (next, lane) in (0..W).filter(|lane| bits >> lane & 1 == 1).enumerate() {
+            assert_eq!((closed_up[next], closed_up_ids[next]), (numbers[lane], ids[lane]), "{bits:b}");
+        }
+    }
 }
 
 struct CheckAll;
@@ -159,6 +192,8 @@ impl Task for CheckAll {
         check::<16, S::F16>();
         check_eight::<S::F8>();
         check_sixteen::<S::F16>();
+        check_dense::<8, S::F8>();
+        check_dense::<16, S::F16>();
     }
 }
 

@@ -13,8 +13,8 @@ use glam::Vec3;
 use serde::Serialize;
 use std::f32::consts::TAU;
 
-/// Side of the pixel blocks that camera rays come in.
-const BLOCK: u32 = 16;
+/// Side of the pixel blocks that camera rays come in: what the widest kernel takes together.
+const BLOCK: u32 = 32;
 
 /// Why a ray is traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -22,8 +22,8 @@ const BLOCK: u32 = 16;
 pub enum RayKind {
     /// Through pixel centres, closest hit. As the renderer makes them: not normalised.
     ///
-    /// Pixels come in blocks of 16 x 16, the blocks row by row, inside a block in Morton order (x first):
-    /// 4 rays in a row are 2 x 2 pixels, 8 are 4 x 2, 16 are 4 x 4.
+    /// Pixels come in blocks of 32 x 32, the blocks row by row, inside a block in Morton order (x first):
+    /// 4 rays in a row are 2 x 2 pixels, 8 are 4 x 2, 16 are 4 x 4, 256 are 16 x 16.
     Camera,
     /// From camera hits to the point light, any hit. Surfaces that face away from it send none.
     Shadow,
@@ -195,9 +195,9 @@ fn camera_rays(camera: &Camera, size: u32) -> Vec<Ray> {
     rays
 }
 
-/// Bits 0, 2, 4 and 6, moved together.
+/// Bits 0, 2, 4, 6 and 8, moved together.
 const fn every_second_bit(i: u32) -> u32 {
-    i & 1 | i >> 1 & 2 | i >> 2 & 4 | i >> 3 & 8
+    i & 1 | i >> 1 & 2 | i >> 2 & 4 | i >> 3 & 8 | i >> 4 & 16
 }
 
 /// A direction about `normal`, as likely as its cosine (Malley: a point of the disc, lifted).

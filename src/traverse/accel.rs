@@ -4,7 +4,7 @@ use super::lanes::{HitPacket, RayPacket};
 use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query};
 use super::records::Resident;
 use super::sieve::{Sieve, Sifted};
-use super::tile::{PACKETS, TileCounts};
+use super::tile::{PACKETS, TileCounts, WIDE};
 use super::width::PacketWidth;
 use crate::cache::Cached;
 use crate::error::Result;
@@ -294,16 +294,39 @@ impl Accel {
         }
     }
 
-    /// The closest hits of up to sixteen packets that share their origin, as squares of a picture do; the
+    /// The closest hits of up to 64 packets that share their origin, as squares of a picture do; the
     /// lanes whose bit is not set in `active` come out as misses. What is too unlike to go together is
-    /// traced packet by packet. Panics if there are more than sixteen packets, or not as many `active`
+    /// traced packet by packet. Panics if there are more than 64 packets, or not as many `active`
     /// and `hits`.
+    ///
+    /// More than sixteen are a wide beam if the scene is all in memory, and otherwise go sixteen at a time. Each
+    /// sixteen of them should be neighbours, and so should each four: squares of a picture in Morton order.
     pub fn intersect_tile(&self, rays: &[RayPacket<16>], active: &[u32], hits: &mut [HitPacket<16>]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
-        let lanes = tile_lanes(rays, active);
-        let left = self.ask(IntersectTile { rays, active: &lanes, hits: &mut *hits });
+        let lanes = tile_lanes::<WIDE>(rays, active);
+        let mut left = lanes;
+        if rays.len() > PACKETS && self.cached().is_none() {
+            left = self.ask_resident(IntersectTile { rays, active: &lanes, hits: &mut *hits });
+        }
+        let squares = rays.chunks(PACKETS).zip(hits.chunks_mut(PACKETS));
+        for ((rays, hits), (lanes, left)) in squares.zip(lanes.iter().zip(left)) {
+            self.intersect_square(rays, lanes, left, hits);
+        }
+    }
+
+    /// The closest hits of the lanes that are `left` of up to sixteen packets; misses in packets without any `lanes`.
+    fn intersect_square(
+        &self,
+        rays: &[RayPacket<16>],
+        lanes: &[u32; PACKETS],
+        mut left: [u32; PACKETS],
+        hits: &mut [HitPacket<16>],
+    ) {
+        if left != [0; PACKETS] {
+            [left] = self.ask(IntersectTile { rays, active: &[left], hits: &mut *hits });
+        }
         for (((rays, active), left), hits) in rays.iter().zip(lanes).zip(left).zip(hits) {
-            if active == 0 {
+            if *active == 0 {
                 *hits = HitPacket::miss();
             } else if left != 0 {
                 *hits = self.intersect_packet(rays, left);
@@ -315,7 +338,7 @@ impl Accel {
     /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode. Panics if the scene is not all
     /// in memory.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
-        let lanes = tile_lanes(rays, active);
+        let [lanes] = tile_lanes::<1>(rays, active);
         let query = CountTile { rays, active: &lanes, any_hit, counts: &mut *counts };
         let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
@@ -325,16 +348,20 @@ impl Accel {
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet. Rays go
     /// together if they start at one point, or run toward one and no farther (it need not be named), or
-    /// are parallel; otherwise as [`intersect_tile`](Self::intersect_tile).
+    /// are parallel; otherwise as [`intersect_tile`](Self::intersect_tile). More than sixteen packets go sixteen at a
+    /// time.
     pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
-        let lanes = tile_lanes(rays, active);
-        let left = self.ask(OccludedTile { rays, active: &lanes, found: &mut *occluded });
-        for (((rays, active), left), occluded) in rays.iter().zip(lanes).zip(left).zip(occluded) {
-            if active == 0 {
-                *occluded = 0;
-            } else if left != 0 {
-                *occluded = self.occluded_packet(rays, left);
+        let lanes = tile_lanes::<WIDE>(rays, active);
+        let squares = rays.chunks(PACKETS).zip(occluded.chunks_mut(PACKETS));
+        for ((rays, occluded), lanes) in squares.zip(&lanes) {
+            let left = self.ask(OccludedTile { rays, active: lanes, found: &mut *occluded });
+            for (((rays, active), left), occluded) in rays.iter().zip(lanes).zip(left).zip(occluded) {
+                if *active == 0 {
+                    *occluded = 0;
+                } else if left != 0 {
+                    *occluded = self.occluded_packet(rays, left);
+                }
             }
         }
     }
@@ -358,13 +385,13 @@ fn halves_of(rays: &[RayPacket<16>], active: &[u32]) -> ([RayPacket<8>; 2 * PACK
     (halves, lanes)
 }
 
-/// The lanes of a tile's packets that count: none in packets that are not there. Panics if there are too
-/// many packets, or not as many of both.
-fn tile_lanes(rays: &[RayPacket<16>], active: &[u32]) -> [u32; PACKETS] {
-    assert!(rays.len() <= PACKETS, "at most sixteen packets");
+/// The lanes that count of a tile's packets, in `K` squares of sixteen: none in packets that are not there. Panics if
+/// there are too many packets, or not as many of both.
+fn tile_lanes<const K: usize>(rays: &[RayPacket<16>], active: &[u32]) -> [[u32; PACKETS]; K] {
+    assert!(rays.len() <= K * PACKETS, "at most {} packets", K * PACKETS);
     assert_eq!(rays.len(), active.len(), "as many lanes as packets");
-    let mut lanes = [0; PACKETS];
-    for (lanes, active) in lanes.iter_mut().zip(active) {
+    let mut lanes = [[0; PACKETS]; K];
+    for (lanes, active) in lanes.as_flattened_mut().iter_mut().zip(active) {
         *lanes = active & lanes_of(16);
     }
     lanes

@@ -7,7 +7,7 @@ use crate::geometry::triangle::{self, Candidate, Mode, Test};
 use crate::simd::{Lanes, Mask};
 
 /// The id of no triangle yet: greater than any, so that equal `t` lets the first hit in.
-const NONE: i32 = i32::MAX;
+pub const NONE: i32 = i32::MAX;
 
 /// A hit's id as the library gives it.
 const _: () = assert!(NO_PRIMITIVE > NONE as u32);
@@ -28,6 +28,13 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     pub fn new(tfar: L) -> Self {
         let zero = L::splat(0.0);
         Self { t: L::splat(f32::MAX).min(tfar), u: zero, v: zero, primitive: L::ids(NONE) }
+    }
+
+    /// What was found before: the closest `t` or `tfar`, and ids or [`NONE`]. Weights are not kept.
+    #[inline(always)]
+    pub fn of_found(t: L, primitive: L::Ids) -> Self {
+        let zero = L::splat(0.0);
+        Self { t, u: zero, v: zero, primitive }
     }
 
     /// Takes up what a triangle's test found in the lanes `live`: the least `t`, then the lowest id.

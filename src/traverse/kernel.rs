@@ -15,16 +15,29 @@ pub enum Kernel {
     Packet16,
     /// Some thirty rays in flight, each alone: for rays that have nothing in common. It is handed 64 at least.
     Stream,
+    /// Up to 4096 rays that need have nothing in common but many of which visit the same places: lists of rays are
+    /// filtered down the tree.
+    Filter,
     /// Up to 256 rays from one point as sixteen packets; rays that are too unlike go packet by packet.
     Tile,
+    /// Up to 1024 rays from one point as four times sixteen packets, likewise; shadow rays go as by [`Tile`](Self::Tile).
+    WideTile,
 }
 
 impl Kernel {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Single, Self::Packet4, Self::Packet8, Self::Packet16, Self::Stream, Self::Tile];
+    pub const ALL: [Self; 8] = [
+        Self::Single,
+        Self::Packet4,
+        Self::Packet8,
+        Self::Packet16,
+        Self::Stream,
+        Self::Filter,
+        Self::Tile,
+        Self::WideTile,
+    ];
 
-    /// `single`, `packet4`, `packet8`, `packet16`, `stream` or `tile`.
+    /// `single`, `packet4`, `packet8`, `packet16`, `stream`, `filter`, `tile` or `tile1024`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Single => "single",
@@ -32,7 +45,9 @@ impl Kernel {
             Self::Packet8 => "packet8",
             Self::Packet16 => "packet16",
             Self::Stream => "stream",
+            Self::Filter => "filter",
             Self::Tile => "tile",
+            Self::WideTile => "tile1024",
         }
     }
 
@@ -44,7 +59,9 @@ impl Kernel {
             Self::Packet8 => 8,
             Self::Packet16 => 16,
             Self::Stream => 64,
+            Self::Filter => 4096,
             Self::Tile => 256,
+            Self::WideTile => 1024,
         }
     }
 
@@ -56,7 +73,9 @@ impl Kernel {
             Self::Packet8 => "packets of 8",
             Self::Packet16 => "packets of 16",
             Self::Stream => "streams of 64",
+            Self::Filter => "lists of up to 4096",
             Self::Tile => "beams of 256",
+            Self::WideTile => "beams of 1024",
         }
     }
 

@@ -24,6 +24,7 @@ impl<const W: usize> RayPacket<W> {
     }
 
     /// The rays of a slice in order, at most `W`; lanes beyond its end are empty.
+    #[inline]
     pub fn of_slice(rays: &[Ray]) -> Self {
         let mut packet = Self::empty();
         for (lane, ray) in rays.iter().enumerate() {

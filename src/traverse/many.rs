@@ -3,7 +3,7 @@
 use super::accel::{Accel, lanes_of};
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
-use super::tile::PACKETS;
+use super::tile::{PACKETS, WIDE};
 use super::width::PacketWidth;
 use crate::geometry::{Hit, Ray};
 
@@ -19,7 +19,10 @@ impl Accel {
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
             Kernel::Stream if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
             Kernel::Stream => self.intersect_stream(rays, hits),
-            Kernel::Tile => self.intersect_tiles(rays, hits),
+            Kernel::Filter if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
+            Kernel::Filter => self.intersect_filtered(rays, hits),
+            Kernel::Tile => self.intersect_tiles::<1>(rays, hits),
+            Kernel::WideTile => self.intersect_tiles::<WIDE>(rays, hits),
         }
     }
 
@@ -34,7 +37,9 @@ impl Accel {
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
             Kernel::Stream if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
             Kernel::Stream => self.occluded_stream(rays, occluded),
-            Kernel::Tile => self.occluded_tiles(rays, occluded),
+            Kernel::Filter if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
+            Kernel::Filter => self.occluded_filtered(rays, occluded),
+            Kernel::Tile | Kernel::WideTile => self.occluded_tiles(rays, occluded),
         }
     }
 
@@ -62,10 +67,14 @@ impl Accel {
         }
     }
 
-    fn intersect_tiles(&self, rays: &[Ray], hits: &mut [Hit]) {
-        for (rays, hits) in rays.chunks(PACKETS * 16).zip(hits.chunks_mut(PACKETS * 16)) {
-            let (packets, active) = packets_of(rays);
-            let mut found = [const { HitPacket::miss() }; PACKETS];
+    /// By beams of `K` squares.
+    fn intersect_tiles<const K: usize>(&self, rays: &[Ray], hits: &mut [Hit]) {
+        let size = K * PACKETS * 16;
+        for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
+            let (packets, active) = packets_of::<K>(rays);
+            let (packets, active) = (packets.as_flattened(), active.as_flattened());
+            let mut found = [const { [const { HitPacket::miss() }; PACKETS] }; K];
+            let found = found.as_flattened_mut();
             let count = rays.len().div_ceil(16);
             self.intersect_tile(&packets[..count], &active[..count], &mut found[..count]);
             for (i, hit) in hits.iter_mut().enumerate() {
@@ -76,7 +85,7 @@ impl Accel {
 
     fn occluded_tiles(&self, rays: &[Ray], occluded: &mut [bool]) {
         for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
-            let (packets, active) = packets_of(rays);
+            let ([packets], [active]) = packets_of::<1>(rays);
             let mut found = [0; PACKETS];
             let count = rays.len().div_ceil(16);
             self.occluded_tile(&packets[..count], &active[..count], &mut found[..count]);
@@ -87,11 +96,12 @@ impl Accel {
     }
 }
 
-/// Up to a tile's rays as packets, and the lanes that hold one.
-fn packets_of(rays: &[Ray]) -> ([RayPacket<16>; PACKETS], [u32; PACKETS]) {
-    let mut packets = [const { RayPacket::empty() }; PACKETS];
-    let mut active = [0; PACKETS];
-    for ((rays, packet), active) in rays.chunks(16).zip(&mut packets).zip(&mut active) {
+/// Up to `K` squares' rays as packets, and the lanes that hold one.
+fn packets_of<const K: usize>(rays: &[Ray]) -> ([[RayPacket<16>; PACKETS]; K], [[u32; PACKETS]; K]) {
+    let mut packets = [const { [const { RayPacket::empty() }; PACKETS] }; K];
+    let mut active = [[0; PACKETS]; K];
+    let places = packets.as_flattened_mut().iter_mut().zip(active.as_flattened_mut());
+    for (rays, (packet, active)) in rays.chunks(16).zip(places) {
         *packet = RayPacket::of_slice(rays);
         *active = lanes_of(rays.len());
     }

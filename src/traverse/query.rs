@@ -92,20 +92,20 @@ where
     }
 }
 
-/// The closest hits of a tile's packets that are part of a beam; the lanes of the others.
-pub struct IntersectTile<'a> {
+/// The closest hits of `K` squares' packets that are part of a beam; the lanes of the others.
+pub struct IntersectTile<'a, const K: usize> {
     pub rays: &'a [RayPacket<16>],
-    pub active: &'a [u32; PACKETS],
+    pub active: &'a [[u32; PACKETS]; K],
     pub hits: &'a mut [HitPacket<16>],
 }
 
-impl Query for IntersectTile<'_> {
-    type Output = [u32; PACKETS];
+impl<const K: usize> Query for IntersectTile<'_, K> {
+    type Output = [[u32; PACKETS]; K];
 
     #[inline(always)]
-    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> [u32; PACKETS] {
+    fn run<S: Simd, M: Mode, T: Records<M>>(self, tree: &T) -> [[u32; PACKETS]; K] {
         let Self { rays, active, hits } = self;
-        tile::intersect::<S, _, M, _>(tree, rays, active, hits, &mut ())
+        tile::intersect::<S, _, M, _, K>(tree, rays, active, hits, &mut ())
     }
 }
 
@@ -145,7 +145,8 @@ impl Query for CountTile<'_> {
             tile::occluded::<S, _, M, _>(tree, rays, active, found, counts)
         } else {
             let hits = &mut [const { HitPacket::miss() }; PACKETS][..rays.len()];
-            tile::intersect::<S, _, M, _>(tree, rays, active, hits, counts)
+            let [left] = tile::intersect::<S, _, M, _, 1>(tree, rays, &[*active], hits, counts);
+            left
         }
     }
 }

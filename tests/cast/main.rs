@@ -401,7 +401,7 @@ fn outputs_that_cannot_be_are_refused() {
 fn options_without_sense_are_refused() {
     let place = square();
     for (option, expected) in [
-        ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256"),
+        ("--packet 5", "--packet: 5 is not one of 1, 4, 8, 16, 64, 256, 1024, 4096"),
         ("--threads 1025", "--threads: 1025"),
         ("--accuracy precise", "--accuracy: \"precise\""),
         ("--profile nowhere", "--profile: there is no"),

@@ -5,7 +5,7 @@ use crate::meshes::{cube, floor, globe, joined, mapped, of_triangles, sphere, tw
 use crate::numbers::{Numbers, seeds};
 use crate::scene::Scene;
 use raypack::Vec3;
-use raypack::geometry::{Hit, Ray};
+use raypack::geometry::{Accuracy, Hit, Ray};
 use raypack::kdtree::BuildParams;
 use raypack::mesh::Mesh;
 use raypack::simd::Isa;
@@ -403,4 +403,65 @@ fn a_tile_that_looks_two_ways_is_two_beams() {
         }
     }
     assert_eq!(found.occluded[0], found.occluded[1]);
+}
+
+/// A picture of 32 x 32 rays as packets in Morton order.
+fn wide_picture(eye: Vec3, at: Vec3, fov: f32) -> Vec<RayPacket<16>> {
+    let every_second_bit = |i: usize| (0..5).fold(0, |bits, k| bits | (i >> (2 * k) & 1) << k);
+    let rays = picture(eye, at, 32, fov);
+    let ray = |x: usize, y: usize| rays[(y / 16 * 2 + x / 16) * 256 + y % 16 * 16 + x % 16];
+    let rays: Vec<Ray> = (0..1024).map(|i| ray(every_second_bit(i), every_second_bit(i >> 1))).collect();
+    rays.chunks(16).map(RayPacket::of_slice).collect()
+}
+
+#[test]
+fn wide_beams_find_what_packets_do_alone() {
+    let ball = sphere(4).mesh;
+    let hall = joined([&ball, &mapped(&ball, |p| p * 40.0), &mapped(&ball, |p| p * 0.2 + Vec3::Y * 2.0)]);
+    let tree = Accel::build(&hall, &BuildParams::default()).expect("builds");
+    for seed in seeds() {
+        let mut numbers = Numbers::new(seed, 46);
+        let eye = numbers.direction() * 3.0;
+        // One wide enough for packets to go alone, and for triangles to be smaller than packets.
+        for fov in [3.0, 50.0, 110.0] {
+            let whole = wide_picture(eye, numbers.vector() * 0.3, fov);
+            let mut parts = whole.clone();
+            let other = wide_picture(-eye, numbers.vector(), fov);
+            parts[16..32].clone_from_slice(&other[16..32]);
+            parts[40] = other[3].clone();
+            for packet in &mut parts[45..50] {
+                packet.tnear = [numbers.unit() * 4.0; 16];
+                packet.tfar = [numbers.unit() * 8.0; 16];
+            }
+            let active: Vec<u32> = (0..64)
+                .map(|i| match i % 7 {
+                    0 => 0,
+                    1 => numbers.below(1 << 16) as u32,
+                    _ => 0xffff,
+                })
+                .collect();
+            for isa in Isa::available() {
+                for accuracy in Accuracy::ALL {
+                    let accel = tree.clone().with_isa(isa).with_accuracy(accuracy);
+                    for (packets, lanes) in
+                        [(&whole, &[0xffff; 64][..]), (&whole, &active), (&parts, &active)]
+                    {
+                        for count in [17, 32, 49, 64] {
+                            let (packets, lanes) = (&packets[..count], &lanes[..count]);
+                            let mut hits = vec![HitPacket { t: [7.0; 16], ..HitPacket::miss() }; count];
+                            accel.intersect_tile(packets, lanes, &mut hits);
+                            let mut occluded = vec![u32::MAX; count];
+                            accel.occluded_tile(packets, lanes, &mut occluded);
+                            for (i, packet) in packets.iter().enumerate() {
+                                let what = format!("{isa}, {accuracy}, {fov}, packet {i} of {count}");
+                                let alone = accel.intersect_packet(packet, lanes[i]);
+                                assert_eq!(hits[i], alone, "{what}");
+                                assert_eq!(occluded[i], accel.occluded_packet(packet, lanes[i]), "{what}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -102,6 +102,11 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     }
 
     #[inline(always)]
+    fn sift(&self, triangle: &Projected, lanes: L::Mask) -> L::Mask {
+        self.test(triangle, lanes).inside & lanes
+    }
+
+    #[inline(always)]
     fn test(&self, triangle: &Projected, _lanes: L::Mask) -> Candidate<W, L> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let [i, j, k] = RENAMED[(triangle.names & AXIS) as usize];

@@ -34,6 +34,10 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// gap that so opens between its neighbours.
     fn test(&self, triangle: &Self::Record, lanes: L::Mask) -> Candidate<W, L>;
 
+    /// The lanes in `lanes` that [`test`](Self::test) may say to be inside: all that are, and few others. No branch
+    /// depends on what they do.
+    fn sift(&self, triangle: &Self::Record, lanes: L::Mask) -> L::Mask;
+
     /// Whether `test_placed` gives no weights, for [`test`](Self::test) to be asked for them in the end.
     const DEFERS: bool = false;
 

@@ -6,10 +6,10 @@ use super::path::Way;
 use crate::geometry::{Hit, Ray};
 use crate::scene::Surface;
 use crate::scene::effects::Effect;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch};
 
-/// Rays that go to a kernel at once: sixteen packets of sixteen.
-const LOT: usize = 256;
+/// Rays that go to a kernel at once: as many as a wide beam holds.
+const LOT: usize = 1024;
 
 /// Traces a worker's rays, and learns which kernel is quickest for which kind of them.
 #[derive(Debug, Default)]
@@ -17,7 +17,9 @@ pub struct Tracer {
     /// What was learnt about rays that may have much in common.
     ways: [Dispatch; Way::ALL.len()],
     /// The same of rays to lights.
-    lights: [Dispatch; 4],
+    lights: [Dispatch; 3],
+    /// What was learnt about rays that go everywhere: from surfaces, and to all that surrounds the scene.
+    scattered: ScatteredDispatch,
     packets: Packets,
     found: Vec<bool>,
     sifted: Vec<Ray>,
@@ -70,11 +72,13 @@ impl Tracer {
         self.ways[Way::Camera as usize]
     }
 
-    /// The closest hits of rays of one kind, by the kernel named or, for [`Kernel::Tile`], by whichever is quickest.
+    /// The closest hits of rays of one kind, by the kernel named or, for beams, by whichever is quickest.
     pub fn intersect(&mut self, accel: &Accel, kernel: Kernel, way: Way, rays: &[Ray], hits: &mut [Hit]) {
         match (kernel, way) {
-            (Kernel::Tile, Way::Diffuse) => accel.intersect_many(Kernel::Stream, rays, hits),
-            (Kernel::Tile, _) => {
+            (Kernel::Tile | Kernel::WideTile, Way::Diffuse) => {
+                self.scattered.intersect(accel, rays, hits);
+            }
+            (Kernel::Tile | Kernel::WideTile, _) => {
                 let dispatch = &mut self.ways[way as usize];
                 for (rays, hits) in rays.chunks(LOT).zip(hits.chunks_mut(LOT)) {
                     let packets = &mut self.packets;
@@ -82,7 +86,7 @@ impl Tracer {
                     let found = &mut packets.hits[..count];
                     dispatch.intersect(
                         accel,
-                        Place::NONE,
+                        &[Place::NONE],
                         &packets.rays[..count],
                         &packets.active[..count],
                         found,
@@ -108,12 +112,15 @@ impl Tracer {
     ) {
         self.found.clear();
         self.found.resize(rays.len(), false);
-        if kernel == Kernel::Tile {
+        if !matches!(kernel, Kernel::Tile | Kernel::WideTile) {
+            accel.occluded_many(kernel, rays, &mut self.found);
+        } else if effect == Effect::Environment {
+            self.scattered.occluded(accel, rays, &mut self.found);
+        } else {
             let dispatch = match effect {
                 Effect::Shadows => &mut self.lights[0],
                 Effect::SoftShadows => &mut self.lights[1],
-                Effect::Environment => &mut self.lights[2],
-                _ => &mut self.lights[3],
+                _ => &mut self.lights[2],
             };
             for (rays, found) in rays.chunks(LOT).zip(self.found.chunks_mut(LOT)) {
                 let packets = &mut self.packets;
@@ -121,7 +128,7 @@ impl Tracer {
                 let lanes = &mut packets.occluded[..count];
                 dispatch.occluded(
                     accel,
-                    Place::NONE,
+                    &[Place::NONE],
                     &packets.rays[..count],
                     &packets.active[..count],
                     lanes,
@@ -130,8 +137,6 @@ impl Tracer {
                     *found = lanes[i / 16] >> (i % 16) & 1 == 1;
                 }
             }
-        } else {
-            accel.occluded_many(kernel, rays, &mut self.found);
         }
         for (&to, &found) in to.iter().zip(&self.found) {
             occluded[to] = found;

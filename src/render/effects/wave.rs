@@ -25,7 +25,7 @@ use std::time::Instant;
 /// All that paths meet.
 pub struct World<'a, S> {
     pub accel: &'a Accel,
-    /// What traces: [`Kernel::Tile`] for whatever is quickest.
+    /// What traces: a kernel of beams for whatever is quickest.
     pub kernel: Kernel,
     pub surface: &'a S,
     pub resolver: Resolver<'a>,

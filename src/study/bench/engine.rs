@@ -4,8 +4,13 @@ use crate::geometry::{Accuracy, Hit, Ray};
 use crate::simd::prefetch;
 use std::sync::{Mutex, PoisonError};
 
-/// Rays that a worker takes at a time.
+/// Rays that a worker takes at a time, at least.
 pub const CHUNK: usize = 1024;
+
+/// How many of so many rays a worker takes at a time: as many as lists of rays hold, if enough for all workers is left then.
+pub const fn chunk_of(rays: usize) -> usize {
+    if rays >= 1 << 17 { 4 * CHUNK } else { CHUNK }
+}
 
 /// A library under test, with every tree built that its modes need.
 pub trait Engine: Sync {
@@ -108,7 +113,7 @@ impl<R, C: Clone, A: Clone + Default> Lot<R, C, A> {
                 if any_hit { Out::Any(vec![A::default(); n]) } else { Out::Closest(vec![miss.clone(); n]) };
             Self { rays: prepare(chunk), out: Mutex::new(out) }
         };
-        rays.chunks(CHUNK).map(lot).collect()
+        rays.chunks(chunk_of(rays.len())).map(lot).collect()
     }
 
     /// Brings the lot into the caches: the memory for results, and the slice that the rays are in.

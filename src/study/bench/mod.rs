@@ -46,7 +46,7 @@ use crate::simd::Isa;
 use crate::study::peers::embree::Build;
 use crate::study::rays::{RayKind, RaySets, Setup};
 use crate::traverse::Kernel;
-use engine::{CHUNK, Engine};
+use engine::{Engine, chunk_of};
 use ours::Ours;
 use race::{Entry, race};
 
@@ -248,7 +248,7 @@ fn race_kind(
             entries.push(Entry { engine: number, qualifies: engine.qualifies() });
         }
     }
-    let chunks = rays.len().div_ceil(CHUNK);
+    let chunks = rays.len().div_ceil(chunk_of(rays.len()));
     let mut speeds = Vec::new();
     for &threads in &options.threads {
         progress(&format!("{} rays, {threads} thread{}", kind.name(), if threads == 1 { "" } else { "s" }));

@@ -13,8 +13,7 @@ use crate::mesh::Mesh;
 use crate::simd::Isa;
 use crate::study::rays::RayKind;
 use crate::traverse::{
-    Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, Place, RayPacket, SliceDispatch,
-    TileCounts,
+    Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
 };
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -100,20 +99,21 @@ impl Ours {
         Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
     }
 
-    /// The mode that traces sixteen packets of 16 together, as far as they are alike.
-    fn tiles<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
-        let closest = |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
-            for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
+    /// A mode that traces sixteen packets of 16 together, or sixty-four, as far as they are alike.
+    fn tiles<'a>(&'a self, kernel: Kernel, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
+        let size = kernel.width() / 16;
+        let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
+            for ((packets, lanes), out) in rays.tiles(size).zip(hits.chunks_mut(size)) {
                 accel.intersect_tile(packets, lanes, out);
             }
         };
-        let any = |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
-            for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
+        let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
+            for ((packets, lanes), out) in rays.tiles(size).zip(flags.chunks_mut(size)) {
                 accel.occluded_tile(packets, lanes, out);
             }
         };
         let lots = Packets::lots(rays, any_hit);
-        Box::new(PacketRun { engine: self, mode: Kernel::Tile.name(), lots, closest, any })
+        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
     }
 
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
@@ -124,15 +124,15 @@ impl Ours {
         let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             let mut dispatch = shared.take();
-            for ((packets, lanes), out) in rays.tiles().zip(hits.chunks_mut(TILE)) {
-                dispatch.intersect(accel, Place::NONE, packets, lanes, out);
+            for ((packets, lanes), out) in rays.tiles(LOT).zip(hits.chunks_mut(LOT)) {
+                dispatch.intersect(accel, &[], packets, lanes, out);
             }
             shared.put(dispatch);
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
             let mut dispatch = learnt.take();
-            for ((packets, lanes), out) in rays.tiles().zip(flags.chunks_mut(TILE)) {
-                dispatch.occluded(accel, Place::NONE, packets, lanes, out);
+            for ((packets, lanes), out) in rays.tiles(LOT).zip(flags.chunks_mut(LOT)) {
+                dispatch.occluded(accel, &[], packets, lanes, out);
             }
             learnt.put(dispatch);
         };
@@ -165,14 +165,14 @@ impl Engine for Ours {
 
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
         let contender = |kernel| match kernel {
-            Kernel::Single | Kernel::Stream => {
+            Kernel::Single | Kernel::Stream | Kernel::Filter => {
                 Box::new(SliceRun { engine: self, way: Way::Named(kernel), lots: slices(rays, any_hit) })
                     as Box<dyn Contender + 'a>
             }
             Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
             Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
             Kernel::Packet16 => self.packets::<16>(kernel, rays, any_hit),
-            Kernel::Tile => self.tiles(rays, any_hit),
+            Kernel::Tile | Kernel::WideTile => self.tiles(kernel, rays, any_hit),
         };
         let mixed =
             SliceRun { engine: self, way: Way::Mixed(DispatchPool::default()), lots: slices(rays, any_hit) };
@@ -253,6 +253,9 @@ pub const MIXED: &str = "mixed";
 /// Packets in a tile.
 const TILE: usize = 16;
 
+/// Packets that a choice is made for at once.
+const LOT: usize = 64;
+
 /// Packets of `W`, all full but perhaps the last.
 struct Packets<const W: usize> {
     packets: Vec<RayPacket<W>>,
@@ -276,8 +279,8 @@ impl<const W: usize> Packets<W> {
 
     /// Packets a tile at a time, with a bit for each of their rays.
     #[inline(always)]
-    fn tiles(&self) -> impl Iterator<Item = (&[RayPacket<W>], &[u32])> {
-        self.packets.chunks(TILE).zip(self.lanes.chunks(TILE))
+    fn tiles(&self, size: usize) -> impl Iterator<Item = (&[RayPacket<W>], &[u32])> {
+        self.packets.chunks(size).zip(self.lanes.chunks(size))
     }
 }
 

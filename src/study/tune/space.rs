@@ -33,7 +33,7 @@ pub const SETTINGS: [Setting; 9] = [
     ),
     Setting {
         key: "render.packet",
-        ladder: &[1.0, 4.0, 8.0, 16.0, 64.0, 256.0],
+        ladder: &[1.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1024.0, 4096.0],
         get: |p| p.render.packet.width() as f64,
         set: |p, x| p.render.packet = Kernel::of_width(x as usize).unwrap_or(p.render.packet),
     },

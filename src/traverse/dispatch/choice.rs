@@ -114,7 +114,7 @@ impl<const WAYS: usize> Choice<WAYS> {
     }
 
     /// Whether all ways are being tried for the first time.
-    fn is_beginning(&self) -> bool {
+    pub fn is_beginning(&self) -> bool {
         self.lots < 2 * FIRST * WAYS as u32
     }
 

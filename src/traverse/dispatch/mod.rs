@@ -6,13 +6,19 @@
 //! its instruction set, and nothing that could be known beforehand tells it as well as having tried: so a
 //! [`Dispatch`] times what it does, square by square, and does what was quickest nearby, or, in a picture that is not the
 //! first of its kind, at that [place](Places). Only time hangs on the choice: hits are the same, bit for bit.
+//!
+//! It is chosen twice. Four squares may go as one wide beam where squares go best as beams, or, for any hit, as lists of rays
+//! where they do not: which is better is learnt from what a *lot* of four has cost either way. If they do neither, each of
+//! them is chosen for by itself, as triangles as small as pixels want it.
 
 mod choice;
 mod places;
 mod pool;
+mod scattered;
 mod slices;
 
 pub use pool::DispatchPool;
+pub use scattered::ScatteredDispatch;
 pub use slices::SliceDispatch;
 
 /// What squares of a picture have cost, for [`Dispatch`].
@@ -24,11 +30,20 @@ use super::accel::Accel;
 use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
 use super::stopwatch::Stopwatch;
+use super::tile::PACKETS;
 use choice::Choice;
 use places::Costs;
 
-/// The kernels that it chooses among.
+/// The kernels that it chooses among for a square of sixteen packets.
 const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
+
+/// The first of them.
+const BEAM: usize = 0;
+
+/// What it chooses among for a lot of such squares: a wide beam (lists, for any hit), or each square by itself. Kernels that
+/// are named here stand for what is done.
+const LOT_WAYS: [Kernel; 2] = [Kernel::WideTile, Kernel::Tile];
+const ANY_LOT_WAYS: [Kernel; 2] = [Kernel::Filter, Kernel::Tile];
 
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
 /// who uses both needs both in memory. On a power plant of which 16 % were in memory, packets alone read 28 %
@@ -44,47 +59,128 @@ const LEAST_RAYS: usize = 64;
 /// each kind of ray and each thread.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dispatch {
+    lots: Choice<{ LOT_WAYS.len() }>,
+    any_lots: Choice<{ ANY_LOT_WAYS.len() }>,
     closest: Choice<{ WAYS.len() }>,
     any: Choice<{ WAYS.len() }>,
 }
 
 impl Dispatch {
-    /// As [`Accel::intersect_tile`], by the kernel that is quickest at a place.
+    /// As [`Accel::intersect_tile`], by the kernel that is quickest at these places, one for each sixteen packets; of
+    /// squares that have none nothing is known.
     pub fn intersect(
         &mut self,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [HitPacket<16>],
+    ) {
+        let Self { lots, closest, .. } = self;
+        // Where packets are quicker than beams, wide ones are out of the question.
+        let packets_were_quicker =
+            |place: &Place<'_>| place.closest.is_some_and(|costs| costs.is_slower(BEAM));
+        let in_beams = closest.quickest() == BEAM && !places.iter().any(packets_were_quicker);
+        if !is_lot(accel, closest, rays) || !in_beams {
+            return Self::squares(closest, accel, places, rays, active, hits);
+        }
+        timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
+            Kernel::WideTile => accel.intersect_tile(rays, active, hits),
+            _ => Self::squares(closest, accel, places, rays, active, hits),
+        });
+    }
+
+    /// The same, square by square.
+    fn squares(
+        choice: &mut Choice<{ WAYS.len() }>,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [HitPacket<16>],
+    ) {
+        let mut places = places.iter();
+        let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(hits.chunks_mut(PACKETS));
+        for ((rays, active), hits) in squares {
+            let place = places.next().copied().unwrap_or(Place::NONE);
+            Self::square(choice, accel, place, rays, active, hits);
+        }
+    }
+
+    fn square(
+        choice: &mut Choice<{ WAYS.len() }>,
         accel: &Accel,
         place: Place<'_>,
         rays: &[RayPacket<16>],
         active: &[u32],
         hits: &mut [HitPacket<16>],
     ) {
-        timed(accel, &WAYS, &mut self.closest, place.closest, count(active), |kernel| match kernel {
+        timed(accel, &WAYS, choice, place.closest, count(active), |kernel| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
             _ => accel.intersect_packets(rays, active, hits),
         });
     }
 
-    /// As [`Accel::occluded_tile`], by the kernel that is quickest at a place.
+    /// As [`Accel::occluded_tile`], likewise.
     pub fn occluded(
         &mut self,
         accel: &Accel,
-        place: Place<'_>,
+        places: &[Place<'_>],
         rays: &[RayPacket<16>],
         active: &[u32],
         occluded: &mut [u32],
     ) {
-        timed(accel, &WAYS, &mut self.any, place.any, count(active), |kernel| match kernel {
-            Kernel::Tile => accel.occluded_tile(rays, active, occluded),
-            Kernel::Packet8 => accel.occluded_halves(rays, active, occluded),
-            _ => accel.occluded_packets(rays, active, occluded),
+        let Self { any_lots, any, .. } = self;
+        // Where beams are quicker than packets, they are quicker than lists.
+        if !is_lot(accel, any, rays) || any.quickest() == BEAM {
+            return Self::occluded_squares(any, accel, places, rays, active, occluded);
+        }
+        timed(accel, &ANY_LOT_WAYS, any_lots, None, count(active), |kernel| match kernel {
+            Kernel::Filter => accel.occluded_lists(rays, active, occluded),
+            _ => Self::occluded_squares(any, accel, places, rays, active, occluded),
         });
+    }
+
+    /// The same, square by square.
+    fn occluded_squares(
+        choice: &mut Choice<{ WAYS.len() }>,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        occluded: &mut [u32],
+    ) {
+        let mut places = places.iter();
+        let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(occluded.chunks_mut(PACKETS));
+        for ((rays, active), occluded) in squares {
+            let place = places.next().copied().unwrap_or(Place::NONE);
+            timed(accel, &WAYS, choice, place.any, count(active), |kernel| match kernel {
+                Kernel::Tile => accel.occluded_tile(rays, active, occluded),
+                Kernel::Packet8 => accel.occluded_halves(rays, active, occluded),
+                _ => accel.occluded_packets(rays, active, occluded),
+            });
+        }
     }
 
     /// The kernels that are thought to be quickest at the moment: for closest hits, and for any hit.
     pub fn quickest(&self) -> [Kernel; 2] {
-        [WAYS[self.closest.quickest()], WAYS[self.any.quickest()]]
+        let closest = match LOT_WAYS[self.lots.quickest()] {
+            Kernel::WideTile if !self.lots.is_beginning() => Kernel::WideTile,
+            _ => WAYS[self.closest.quickest()],
+        };
+        let any = match ANY_LOT_WAYS[self.any_lots.quickest()] {
+            Kernel::Filter if !self.any_lots.is_beginning() => Kernel::Filter,
+            _ => WAYS[self.any.quickest()],
+        };
+        [closest, any]
     }
+}
+
+/// Whether packets are a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,
+/// and the first squares are for getting to know the other kernels.
+fn is_lot(accel: &Accel, squares: &Choice<{ WAYS.len() }>, rays: &[RayPacket<16>]) -> bool {
+    rays.len() > PACKETS && accel.cached().is_none() && !squares.is_beginning()
 }
 
 /// Has a kernel trace so many rays of a place, and takes note of how long that took.
@@ -110,16 +206,69 @@ fn timed<const N: usize>(
         Some(costs) => choice.next_at(&costs.known()),
         None => choice.next(),
     };
-    let start = Stopwatch::start(accel);
-    trace(ways[way]);
-    let cost = choice.record(way, rays as u64, start.elapsed(accel));
+    let cost = recorded(accel, choice, way, rays, || trace(ways[way]));
     if let (Some(costs), Some(cost)) = (place, cost) {
         costs.record(way, cost);
     }
     way
 }
 
+/// Has a way trace so many rays, and takes note of how long that took.
+#[inline(always)]
+fn recorded<const N: usize>(
+    accel: &Accel,
+    choice: &mut Choice<N>,
+    way: usize,
+    rays: usize,
+    trace: impl FnOnce(),
+) -> Option<f32> {
+    let start = Stopwatch::start(accel);
+    trace();
+    choice.record(way, rays as u64, start.elapsed(accel))
+}
+
 /// The lanes in which there are rays.
 fn count(active: &[u32]) -> usize {
     active.iter().map(|lanes| lanes.count_ones() as usize).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::kdtree::BuildParams;
+    use crate::mesh::generate::shapes;
+    use glam::Vec3;
+
+    #[test]
+    fn lots_of_any_size_are_answered_as_their_packets_are() {
+        let accel = Accel::build(&shapes::soup(300, 1), &BuildParams::default()).expect("a soup has a tree");
+        let packet = |lot: usize, i: usize| {
+            let ray = |lane: usize| {
+                let place = |k: usize| ((lot * 7 + i * 16 + lane) * k % 97) as f32 / 97.0 - 0.5;
+                Ray::new(Vec3::new(0.5, 0.5, 3.0), Vec3::new(place(3), place(5), -2.5))
+            };
+            RayPacket::of_slice(&std::array::from_fn::<_, 16, _>(ray))
+        };
+        let mut dispatch = Dispatch::default();
+        let places = Places::new(4);
+        for lot in 0..60 {
+            let count = [64, 64, 16, 37, 64, 1][lot % 6];
+            let rays: Vec<RayPacket<16>> = (0..count).map(|i| packet(lot, i)).collect();
+            let active: Vec<u32> = (0..count).map(|i| 0xffff >> (i % 5)).collect();
+            let at: Vec<Place<'_>> = (0..lot % 5).map(|square| places.at(square)).collect();
+            let (mut hits, mut occluded) = (vec![HitPacket::miss(); count], vec![0; count]);
+            dispatch.intersect(&accel, &at, &rays, &active, &mut hits);
+            dispatch.occluded(&accel, &at, &rays, &active, &mut occluded);
+            for i in 0..count {
+                assert_eq!(hits[i], accel.intersect_packet(&rays[i], active[i]), "packet {i} of lot {lot}");
+                assert_eq!(
+                    occluded[i],
+                    accel.occluded_packet(&rays[i], active[i]),
+                    "packet {i} of lot {lot}"
+                );
+            }
+        }
+        assert!(!dispatch.closest.is_beginning() && !dispatch.any.is_beginning());
+    }
 }

@@ -67,6 +67,12 @@ impl<const WAYS: usize> Costs<WAYS> {
         })
     }
 
+    /// Whether a way is known to be slower than another one.
+    pub fn is_slower(&self, way: usize) -> bool {
+        let known = self.known();
+        known[way].is_some_and(|cost| known.iter().flatten().any(|&other| other < cost))
+    }
+
     /// Takes note of what a way has taken now.
     pub fn record(&self, way: usize, cost: f32) {
         let cost = match self.known()[way] {
@@ -92,6 +98,16 @@ mod tests {
         assert_eq!(one.known(), [None, Some(5.25)]);
         assert_eq!(other.known(), [None; 2]);
         assert_eq!(places.at(1).any.expect("it is there").known(), [None; 2]);
+    }
+
+    #[test]
+    fn a_way_is_slower_if_that_is_known() {
+        let costs = Costs::<3>::unknown();
+        assert!(!costs.is_slower(0));
+        costs.record(0, 5.0);
+        assert!(!costs.is_slower(0) && !costs.is_slower(1));
+        costs.record(2, 4.5);
+        assert!(costs.is_slower(0) && !costs.is_slower(1) && !costs.is_slower(2));
     }
 
     #[test]

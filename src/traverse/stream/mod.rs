@@ -27,7 +27,7 @@ mod accel;
 mod flight;
 mod group;
 mod leaf;
-mod step;
+pub mod step;
 
 use super::lanes::RayPacket;
 use super::packet;

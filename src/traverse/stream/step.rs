@@ -68,6 +68,27 @@ fn eight<T>(values: &mut [T], from: usize) -> &mut [T; 8] {
     values[from..].first_chunk_mut().expect("room for eight")
 }
 
+/// A line's planes as a ray sees them, by place.
+pub struct Planes<L: Eight> {
+    /// The line's exits, with the planes' axes.
+    pub exits: L::Ids,
+    pub origin: L,
+    /// 1 / direction.
+    pub inverse: L,
+    /// The walls' half-thickness in units of the parameter.
+    pub margin: L,
+}
+
+/// The exits of a line that a ray takes, the farthest first.
+pub struct Taken<L: Eight> {
+    pub exits: L::Ids,
+    /// Its intervals in them.
+    pub tmin: L,
+    pub tmax: L,
+    /// A bit for each lane in which there is anything.
+    pub bits: u32,
+}
+
 /// Takes the line on top of a stack, puts its exits there, and gives the new top. The ray ends at `tfar`.
 #[inline(always)]
 pub fn step<L: Eight>(lines: &[Line], ray: &Crossing, waiting: &mut Waiting, top: usize, tfar: f32) -> usize {
@@ -75,15 +96,27 @@ pub fn step<L: Eight>(lines: &[Line], ray: &Crossing, waiting: &mut Waiting, top
     let line = &lines[way.line()];
     let tmin = L::splat(waiting.tmin[top]);
     let tmax = L::splat(waiting.tmax[top]).min(L::splat(tfar));
-
-    // Where the ray is in the walls, by place.
     let exits = L::ids_load(&line.exits);
-    let inverse = L::of_fours([&ray.inverse; 2]).pick_in_fours(exits);
-    let origin = L::of_fours([&ray.origin; 2]).pick_in_fours(exits);
-    let margin = L::of_fours([&ray.margin; 2]).pick_in_fours(exits);
-    let t = (L::load(&line.planes) - origin) * inverse;
-    let (enters, leaves) = (t - margin, t + margin);
-    let order = &ORDERS[(inverse.lt(L::splat(0.0)).bits() & 0xff) as usize];
+    let seen = Planes {
+        exits,
+        origin: L::of_fours([&ray.origin; 2]).pick_in_fours(exits),
+        inverse: L::of_fours([&ray.inverse; 2]).pick_in_fours(exits),
+        margin: L::of_fours([&ray.margin; 2]).pick_in_fours(exits),
+    };
+    let taken = take::<L>(line, &seen, way.barred(), tmin, tmax);
+    L::ids_compact(taken.exits, taken.bits, eight(&mut waiting.exits, top));
+    taken.tmin.compact(taken.bits, eight(&mut waiting.tmin, top));
+    taken.tmax.compact(taken.bits, eight(&mut waiting.tmax, top));
+    top + taken.bits.count_ones() as usize - 1
+}
+
+/// The exits that a ray takes of a line in which it is from `tmin` to `tmax`, but for one that is barred.
+#[inline(always)]
+pub fn take<L: Eight>(line: &Line, seen: &Planes<L>, barred: usize, tmin: L, tmax: L) -> Taken<L> {
+    // Where the ray is in the walls, by place.
+    let t = (L::load(&line.planes) - seen.origin) * seen.inverse;
+    let (enters, leaves) = (t - seen.margin, t + seen.margin);
+    let order = &ORDERS[(seen.inverse.lt(L::splat(0.0)).bits() & 0xff) as usize];
 
     // By order: for a wall behind the exit where it is left, for one before it where it is entered. The
     // roots' and the second nodes' ends are in `upper`, the third ones' in `lower`.
@@ -93,7 +126,7 @@ pub fn step<L: Eight>(lines: &[Line], ray: &Crossing, waiting: &mut Waiting, top
     let first = upper.pick_in_fours(L::ids_load(&[2, 2, 2, 2, 0, 0, 0, 0]));
     let second = upper.pick(L::ids_shift::<4>(order));
     let third = lower.pick(L::ids_shift::<8>(order));
-    let exits = L::ids_pick(L::ids_and(exits, L::ids_load(&OPEN[way.barred()])), order);
+    let exits = L::ids_pick(L::ids_and(seen.exits, L::ids_load(&OPEN[barred])), order);
 
     let [far_first, far_second, far_third] =
         [L::mask_from_bits(0b0000_1111), L::mask_from_bits(0b0011_0011), L::mask_from_bits(0b0101_0101)];
@@ -106,11 +139,7 @@ pub fn step<L: Eight>(lines: &[Line], ray: &Crossing, waiting: &mut Waiting, top
 
     // An exit that leads nowhere has nothing but an axis in it.
     let leads = L::ids_less(L::ids(3), exits) | L::ids_less(exits, L::ids(0));
-    let bits = (leads & tmin.le(tmax)).bits() & 0xff;
-    L::ids_compact(exits, bits, eight(&mut waiting.exits, top));
-    tmin.compact(bits, eight(&mut waiting.tmin, top));
-    tmax.compact(bits, eight(&mut waiting.tmax, top));
-    top + bits.count_ones() as usize - 1
+    Taken { exits, tmin, tmax, bits: (leads & tmin.le(tmax)).bits() & 0xff }
 }
 
 /// For each set of places whose planes a ray crosses downward, and for each lane, what is to be fetched:

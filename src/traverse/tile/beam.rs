@@ -1,4 +1,4 @@
-//! A tile's rays as one object: a beam of sixteen packets.
+//! A tile's rays as one object: a beam of sixteen packets, or four times sixteen.
 //!
 //! The rays of a beam have a point in common, the *apex*: they part from it (camera rays), or run toward
 //! it (shadow rays to a point light); or they are parallel (shadow rays to the sun) and the apex is any
@@ -30,6 +30,9 @@
 //!                 +----+----+----+----+           as the squares of a picture are, do best)
 //! ```
 //!
+//! In a wide beam, a lane holds what four packets have between them: of its four squares, each as above, the first has
+//! lanes 0 to 3, the second 4 to 7.
+//!
 //! **Crossing a plane.** Of the two cells beside a plane, all rays of a beam come to the same one first:
 //! to that which holds the apex, or, if they are parallel, to that from which they run. From an apex, a
 //! ray comes to a plane `s` away at the depth `s / slope`; a lane's rays do between `s` times the least
@@ -43,8 +46,11 @@ use crate::geometry::Aabb;
 use crate::simd::Sixteen;
 use crate::traverse::walk::{Interval, MARGIN};
 
-/// Packets in a beam.
+/// Packets in a square: a beam holds one square, or four.
 pub const PACKETS: usize = 16;
+
+/// Squares in a wide beam.
+pub const WIDE: usize = 4;
 
 /// What rates and depths are widened by, outward: more than the few roundings that are in them.
 pub const WIDEN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -91,6 +97,38 @@ pub struct Extent<L> {
     pub low: [L; 2],
     pub high: [L; 2],
     pub depths: Interval<L>,
+}
+
+impl<L: Sixteen> Extent<L> {
+    /// That of no rays.
+    #[inline(always)]
+    pub fn none() -> Self {
+        let (low, high) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
+        Self { low: [low; 2], high: [high; 2], depths: Interval { tmin: low, tmax: high } }
+    }
+
+    /// What the lanes of a beam of such squares have between them: a lane is as many packets as there are squares.
+    #[inline(always)]
+    pub fn of_lanes<const K: usize>(squares: &[Self; K]) -> Self {
+        let [a, b, c, d] = match squares.as_chunks::<4>().0 {
+            [four] => four,
+            _ => return squares[0],
+        };
+        Self {
+            low: [
+                L::least_of_fours(&[a.low[0], b.low[0], c.low[0], d.low[0]]),
+                L::least_of_fours(&[a.low[1], b.low[1], c.low[1], d.low[1]]),
+            ],
+            high: [
+                L::greatest_of_fours(&[a.high[0], b.high[0], c.high[0], d.high[0]]),
+                L::greatest_of_fours(&[a.high[1], b.high[1], c.high[1], d.high[1]]),
+            ],
+            depths: Interval {
+                tmin: L::least_of_fours(&[a.depths.tmin, b.depths.tmin, c.depths.tmin, d.depths.tmin]),
+                tmax: L::greatest_of_fours(&[a.depths.tmax, b.depths.tmax, c.depths.tmax, d.depths.tmax]),
+            },
+        }
+    }
 }
 
 /// How far a beam's rays are from what they would be in exact arithmetic, and from one another.

@@ -1,10 +1,11 @@
 //! What the walk of a beam asks of the rays in it; and rays cut into what registers hold.
 
+use super::beam::PACKETS;
 use super::outline::Block;
 use crate::simd::{Lanes, Sixteen};
 
-/// A beam's rays, and what they have found.
-pub trait Bundle<L: Sixteen> {
+/// The rays of a beam of `K` squares, and what they have found.
+pub trait Bundle<L: Sixteen, const K: usize> {
     /// The work after which a tile is given up, in steps of about one upper node: some times what a tile
     /// takes whose rays are worth tracing together. Rays that are not, because each packet's go all over
     /// the place, or because there are many triangles between one ray and the next, would meet every
@@ -15,16 +16,45 @@ pub trait Bundle<L: Sixteen> {
     /// a light sees it as two places far apart.
     const WIDEST: f32;
 
-    /// The depth beyond which no ray of each packet looks for anything any more.
-    fn reach(&self) -> L;
+    /// The depth beyond which no ray of each packet of a square looks for anything any more.
+    fn reach(&self, square: usize) -> L;
 
-    /// Tests a packet against the triangles whose bits are set in `chosen`, of a block with the ids
+    /// The same of each lane.
+    fn reach_of_lanes(&self) -> L;
+
+    /// Tests a packet of a square against the triangles whose bits are set in `chosen`, of a block with the ids
     /// `primitives`.
-    fn test(&mut self, packet: usize, block: &Block, primitives: &[u32], chosen: u32);
+    fn test(&mut self, square: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32);
 
-    /// A packet walks on by itself, through the full tree below a place of the upper one, from the depth
+    /// A packet of a square walks on by itself, through the full tree below a place of the upper one, from the depth
     /// `tmin` to `tmax`.
-    fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32);
+    fn go_alone(&mut self, square: usize, packet: usize, place: usize, tmin: f32, tmax: f32);
+}
+
+/// The packet `k` of those in a lane of a beam of `K` squares: its square, and its number there.
+#[inline(always)]
+pub fn packet_of<const K: usize>(lane: usize, k: usize) -> (usize, usize) {
+    let packet = lane * K + k;
+    (packet / PACKETS % K, packet % PACKETS)
+}
+
+/// The packets of a square whose lanes' bits are set.
+#[inline(always)]
+pub fn packets_of<const K: usize>(lanes: u32, square: usize) -> u32 {
+    if K == 1 {
+        return lanes;
+    }
+    let four = lanes >> (4 * square) & 0xf;
+    ((four | four << 3 | four << 6 | four << 9) & 0x1111) * 0xf
+}
+
+/// The greatest number of each lane's packets.
+#[inline(always)]
+pub fn greatest_of_lanes<L: Sixteen, const K: usize>(squares: &[L; K]) -> L {
+    match squares.as_chunks::<4>().0 {
+        [four] => L::greatest_of_fours(four),
+        _ => squares[0],
+    }
 }
 
 /// What depths are widened by where they become parameters of rays, relative to themselves.

@@ -22,7 +22,7 @@ pub enum Form {
 const STRAY: f32 = 1.0 / (1 << 20) as f32;
 const STRAY_OF_PLACE: f32 = 1.0 / (1 << 22) as f32;
 
-/// So many packets may not belong to a beam: a tile at the edge of something, or where a light's rays turn from running
+/// So many packets of a square may not belong to a beam: a tile at the edge of something, or where a light's rays turn from running
 /// fastest along one axis to another, has some that point elsewhere. With more, rays are taken to have nothing in
 /// common, which shows soon.
 const MISFITS: u32 = 12;
@@ -54,7 +54,7 @@ impl Seen {
 
 /// The first lane that counts of a packet.
 #[inline(always)]
-fn first_lane(active: &[u32; PACKETS], packet: usize) -> Option<usize> {
+fn first_lane(active: &[u32], packet: usize) -> Option<usize> {
     (active[packet] != 0).then(|| active[packet].trailing_zeros() as usize & 15)
 }
 
@@ -70,12 +70,13 @@ fn direction<const W: usize>(rays: &RayPacket<W>, lane: usize) -> [f32; 3] {
 
 /// The form that rays have if they have any, and its frame, about the way that the packet in the middle goes.
 #[inline(always)]
-pub fn guess(rays: &[RayPacket<16>], active: &[u32; PACKETS]) -> Option<(Form, Frame)> {
+pub fn guess<const K: usize>(rays: &[RayPacket<16>], active: &[[u32; PACKETS]; K]) -> Option<(Form, Frame)> {
+    let active = active.as_flattened();
     let first = (0..rays.len()).find(|&packet| active[packet] != 0)?;
     let last = (0..rays.len()).rfind(|&packet| active[packet] != 0)?;
     let (lane, other) = (first_lane(active, first)?, 31 - (active[last] & 0xffff).leading_zeros() as usize);
     let (o, d) = (origin(&rays[first], lane), direction(&rays[first], lane));
-    let middle = ((first + last) / 2) & 15;
+    let middle = (first + last) / 2 % (PACKETS * K);
     let middle = if active[middle] != 0 { middle } else { first };
     let way = direction(&rays[middle], first_lane(active, middle)?);
     if o == origin(&rays[last], other) {
@@ -90,7 +91,7 @@ pub fn guess(rays: &[RayPacket<16>], active: &[u32; PACKETS]) -> Option<(Form, F
 /// Where rays meet, if they do: where the first comes nearest to that one of all packets' first rays
 /// that parts from it most. In double precision: of a narrow beam, rays meet far away.
 #[inline(always)]
-fn meeting(rays: &[RayPacket<16>], active: &[u32; PACKETS], first: usize) -> Option<[f32; 3]> {
+fn meeting(rays: &[RayPacket<16>], active: &[u32], first: usize) -> Option<[f32; 3]> {
     let double = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
     let lane = first_lane(active, first)?;
     let (o, d) = (double(origin(&rays[first], lane)), double(direction(&rays[first], lane)));
@@ -110,19 +111,35 @@ fn meeting(rays: &[RayPacket<16>], active: &[u32; PACKETS], first: usize) -> Opt
     found
 }
 
-/// The packets' extents if the rays are a beam from its apex. A packet does not belong to it if origins differ,
+/// The packets' extents, square by square, if the rays are a beam from its apex. A packet does not belong to it if origins differ,
 /// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin: it is taken out of
-/// `active`. `None` if there are more than [`MISFITS`] of these.
+/// `active`. `None` if there are more than [`MISFITS`] of these for each square.
 #[inline(always)]
-pub fn from_apex<L: Sixteen>(
+pub fn from_apex<L: Sixteen, const K: usize>(
+    frame: &Frame,
+    rays: &[RayPacket<16>],
+    active: &mut [[u32; PACKETS]; K],
+) -> Option<[Extent<L>; K]> {
+    let mut extents = [Extent::none(); K];
+    let mut misfits = 0;
+    for ((rays, active), extent) in rays.chunks(PACKETS).zip(active).zip(&mut extents) {
+        *extent = square_from_apex(frame, rays, active, &mut misfits, MISFITS * K as u32)?;
+    }
+    Some(extents)
+}
+
+/// The same of one square; `None` as soon as there are more than `most` `misfits`.
+#[inline(always)]
+fn square_from_apex<L: Sixteen>(
     frame: &Frame,
     rays: &[RayPacket<16>],
     active: &mut [u32; PACKETS],
+    misfits: &mut u32,
+    most: u32,
 ) -> Option<Extent<L>> {
     let (zero, endless) = (L::splat(0.0), L::splat(f32::INFINITY));
     let mut places = [[[0.0; 16]; PACKETS]; 2];
     let (mut nearest, mut farthest) = ([0.0; PACKETS], [f32::INFINITY; PACKETS]);
-    let mut misfits = 0;
     for (packet, rays) in rays.iter().enumerate() {
         let lanes = active[packet];
         if lanes == 0 {
@@ -141,7 +158,7 @@ pub fn from_apex<L: Sixteen>(
         ];
         belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
         if belongs.bits() & lanes != lanes {
-            leave_out(&mut active[packet], &mut misfits)?;
+            leave_out(&mut active[packet], misfits, most)?;
             continue;
         }
         (places[0][packet], places[1][packet]) = (slopes[0].store(), slopes[1].store());
@@ -219,7 +236,7 @@ pub fn of_form<L: Sixteen>(
             }
         }
         if belongs.bits() & lanes != lanes {
-            leave_out(&mut active[packet], &mut misfits)?;
+            leave_out(&mut active[packet], &mut misfits, MISFITS)?;
             continue;
         }
         let counts = L::mask_from_bits(lanes);
@@ -239,12 +256,12 @@ pub fn of_form<L: Sixteen>(
     Some((extent(low, high, nearest, farthest, range), Spread { range, stray }))
 }
 
-/// Takes a packet out that does not belong. `None` if there are too many.
+/// Takes a packet out that does not belong. `None` if there are more than `most`.
 #[inline(always)]
-fn leave_out(lanes: &mut u32, misfits: &mut u32) -> Option<()> {
+fn leave_out(lanes: &mut u32, misfits: &mut u32, most: u32) -> Option<()> {
     *lanes = 0;
     *misfits += 1;
-    (*misfits <= MISFITS).then_some(())
+    (*misfits <= most).then_some(())
 }
 
 /// The lanes whose rays are ordinary: their speed forward, which is the direction's greatest component,

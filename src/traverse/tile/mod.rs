@@ -1,4 +1,4 @@
-//! The tile kernel: up to 256 rays from one point walk the tree together.
+//! The tile kernel: up to 256 rays from one point, or 1024, walk the tree together.
 //!
 //! Neighbouring rays of a picture visit the same nodes and miss the same triangles. So what a packet
 //! does for its rays, this kernel does for packets: each lane stands for one of sixteen packets, by
@@ -18,6 +18,11 @@
 //! 5. Where no more than [`FEW`] packets of the beam are left at a node, each goes on alone as a
 //!    packet through the full tree below; and so does every packet, from the start, of a tile that has
 //!    taken so much work that its rays cannot be alike.
+//!
+//! **Wide beams** hold four *squares* of sixteen packets, and a lane stands for four packets that follow one another.
+//! The walk, bringing triangles into lanes and culling for the whole beam are shared by four times as many rays; from
+//! there on each square goes on by itself, as a beam of its own does. Rays that ask for any hit have none: those
+//! toward a light are seldom alike enough (`docs/coherent.md`).
 
 mod beam;
 mod bundle;
@@ -28,7 +33,7 @@ mod page;
 mod probe;
 mod shadow;
 
-pub use beam::PACKETS;
+pub use beam::{PACKETS, WIDE};
 pub use probe::{Probe, TileCounts};
 
 use super::lanes::{HitPacket, RayPacket};
@@ -48,25 +53,25 @@ const FEW: u32 = 1;
 /// A tile may be so many beams, one after the other: where a light is near, its rays run fastest along different axes.
 const BEAMS: usize = 3;
 
-/// The closest hits of the lanes in `active` of up to sixteen packets; the others come out as misses. Gives the lanes
-/// of packets that are part of no beam from one point: for them, and for packets of which no lane is active, nothing
-/// is done.
+/// The closest hits of the lanes in `active` of up to `K` squares of sixteen packets; the others come out as misses. Gives
+/// the lanes of packets that are part of no beam from one point: for them, and for packets of which no lane is active,
+/// nothing is done. `K` is 1, or [`WIDE`].
 #[inline(always)]
-pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe>(
+pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
-    active: &[u32; PACKETS],
+    active: &[[u32; PACKETS]; K],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> [u32; PACKETS] {
+) -> [[u32; PACKETS]; K] {
     let mut left = *active;
     for _ in 0..BEAMS {
         let done = if S::NATIVE == 16 {
-            nearest::<S::F16, S::F16, T, M, P, 16, 1>(tree, rays, &left, hits, probe)
+            nearest::<S::F16, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, hits, probe)
         } else {
-            nearest::<S::F16, S::F8, T, M, P, 8, 2>(tree, rays, &left, hits, probe)
+            nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, hits, probe)
         };
-        if !take(&mut left, done) {
+        if !take(&mut left, &done) {
             break;
         }
     }
@@ -83,54 +88,71 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     found: &mut [u32],
     probe: &mut P,
 ) -> [u32; PACKETS] {
-    let mut left = *active;
+    let mut left = [*active];
     for _ in 0..BEAMS {
         let done = if S::NATIVE == 16 {
             shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, found, probe)
         } else {
             shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, found, probe)
         };
-        if !take(&mut left, done) {
+        if !take(&mut left, &done) {
             break;
         }
     }
+    let [left] = left;
     left
 }
 
 /// Takes packets that are done out of those that are left; whether there may be another beam among these.
 #[inline(always)]
-fn take(left: &mut [u32; PACKETS], done: u32) -> bool {
-    let mut count = 0;
-    for packet in 0..PACKETS {
-        if done >> packet & 1 == 1 {
-            left[packet] = 0;
+fn take<const K: usize>(left: &mut [[u32; PACKETS]; K], done: &[u32; K]) -> bool {
+    let (mut count, mut all) = (0, 0);
+    for square in 0..K {
+        for packet in 0..PACKETS {
+            if done[square] >> packet & 1 == 1 {
+                left[square][packet] = 0;
+            }
+            count += u32::from(left[square][packet] != 0);
         }
-        count += u32::from(left[packet] != 0);
+        all |= done[square];
     }
-    done != 0 && count > FEW
+    all != 0 && count > FEW
 }
 
-/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which packets it was.
+/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which packets of each square
+/// it was.
 #[inline(always)]
-fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize, const PARTS: usize>(
+fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
-    active: &[u32; PACKETS],
+    active: &[[u32; PACKETS]; K],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> u32 {
+) -> [u32; K]
+where
+    L: Sixteen,
+    R: Lanes<N>,
+    T: Records<M>,
+    M: Mode,
+    P: Probe,
+{
     if !tree.scale().is_none() {
-        return 0;
+        return [0; K];
     }
-    let Some((Form::From, frame)) = form::guess(rays, active) else { return 0 };
+    let Some((Form::From, frame)) = form::guess(rays, active) else { return [0; K] };
     let mut belong = *active;
-    let Some(extent) = form::from_apex::<L>(&frame, rays, &mut belong) else { return 0 };
+    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong) else { return [0; K] };
+    let extent = Extent::of_lanes(&extents);
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
-    let mut bundle = Nearest::<L, R, T, M, N, PARTS>::new(tree, rays, &belong, &beam);
-    Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
-    for (packet, hits) in hits.iter_mut().enumerate() {
-        if belong[packet & 15] != 0 {
-            bundle.give(packet, hits);
+    let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
+    bundle.begin();
+    let squares = page::windows(&extents, beam.spread.blur::<false>());
+    Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
+    for (square, (hits, belong)) in hits.chunks_mut(PACKETS).zip(&belong).enumerate() {
+        for (packet, hits) in hits.iter_mut().enumerate() {
+            if belong[packet & 15] != 0 {
+                bundle.give(square, packet, hits);
+            }
         }
     }
     there(&belong)
@@ -141,18 +163,18 @@ fn nearest<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
 fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
-    active: &[u32; PACKETS],
+    active: &[[u32; PACKETS]; 1],
     found: &mut [u32],
     probe: &mut P,
-) -> u32 {
+) -> [u32; 1] {
     if !tree.scale().is_none() {
-        return 0;
+        return [0];
     }
-    let Some((form, frame)) = form::guess(rays, active) else { return 0 };
+    let Some((form, frame)) = form::guess(rays, active) else { return [0] };
     let mut seen = Seen::new();
-    let mut belong = *active;
+    let [mut belong] = *active;
     let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, &mut belong, &mut seen) else {
-        return 0;
+        return [0];
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
     let open = if form == Form::Along {
@@ -165,15 +187,17 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
             *found = belong & !open;
         }
     }
-    there(&belong)
+    there(&[belong])
 }
 
-/// The packets of which a lane counts.
+/// The packets of each square of which a lane counts.
 #[inline(always)]
-fn there(lanes: &[u32; PACKETS]) -> u32 {
-    let mut there = 0;
-    for packet in 0..PACKETS {
-        there |= u32::from(lanes[packet] != 0) << packet;
+fn there<const K: usize>(lanes: &[[u32; PACKETS]; K]) -> [u32; K] {
+    let mut there = [0; K];
+    for square in 0..K {
+        for packet in 0..PACKETS {
+            there[square] |= u32::from(lanes[square][packet] != 0) << packet;
+        }
     }
     there
 }
@@ -205,7 +229,8 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
         let Self { tree, rays, active, frame, ref extent, spread } = *self;
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
         let mut bundle = Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, seen, &interval);
-        Descent::new(tree, &beam).walk(&mut bundle, interval, probe);
+        let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
+        Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
         bundle.open
     }
 }

@@ -1,7 +1,7 @@
 //! Rays of a beam from its apex that ask for their closest hits.
 
 use super::beam::{Beam, PACKETS};
-use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3};
+use super::bundle::{Bundle, ROUNDINGS, greatest_of_lanes, load_part, load_part3};
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
@@ -15,11 +15,11 @@ use crate::traverse::walk::{Interval, Walk};
 /// What the tests of `N` rays keep for a beam.
 type Kept<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Kept;
 
-/// Up to sixteen packets.
+/// Up to `K` squares of sixteen packets.
 ///
-/// Packets stand in the lanes of `L`, as the beam has them. Rays stand in the lanes of `R`, as many as a
+/// A square's packets stand in the lanes of `L`. Rays stand in the lanes of `R`, as many as a
 /// register holds, in `P` parts.
-pub struct Nearest<'a, L, R, T, M, const N: usize, const P: usize>
+pub struct Nearest<'a, L, R, T, M, const N: usize, const P: usize, const K: usize>
 where
     L: Sixteen,
     R: Lanes<N>,
@@ -29,96 +29,107 @@ where
     tree: &'a T,
     rays: &'a [RayPacket<16>],
     /// Which lanes of each packet count.
-    active: &'a [u32; PACKETS],
+    active: &'a [[u32; PACKETS]; K],
     beam: &'a Beam<L, false>,
-    kept: [[Kept<M, R, N>; P]; PACKETS],
-    closest: [[Closest<N, R>; P]; PACKETS],
+    kept: [[[Kept<M, R, N>; P]; PACKETS]; K],
+    closest: [[[Closest<N, R>; P]; PACKETS]; K],
     /// The depth beyond which no ray of a packet looks for anything any more. In a register: a lane that is stored
     /// by itself and loaded with the others at once waits for the memory.
-    reach: L,
+    reach: [L; K],
 }
 
-impl<'a, L, R, T, M, const N: usize, const P: usize> Nearest<'a, L, R, T, M, N, P>
+impl<'a, L, R, T, M, const N: usize, const P: usize, const K: usize> Nearest<'a, L, R, T, M, N, P, K>
 where
     L: Sixteen,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
 {
-    /// The rays at their start.
+    /// Rays of which none looks for anything, until they [`begin`](Self::begin).
     #[inline(always)]
     pub fn new(
         tree: &'a T,
         rays: &'a [RayPacket<16>],
-        active: &'a [u32; PACKETS],
+        active: &'a [[u32; PACKETS]; K],
         beam: &'a Beam<L, false>,
     ) -> Self {
-        let mut bundle = Self {
+        Self {
             tree,
             rays,
             active,
             beam,
-            kept: [[Default::default(); P]; PACKETS],
-            closest: [[Closest::new(R::splat(f32::NEG_INFINITY)); P]; PACKETS],
-            reach: L::splat(f32::INFINITY),
-        };
-        for packet in 0..rays.len().min(PACKETS) {
-            for part in 0..P {
-                let rays = &rays[packet];
-                let direction = load_part3::<N, R>(&rays.direction, part);
-                bundle.kept[packet][part] = M::Test::<N, R>::keep(&direction, beam.frame.axes[2]);
-                // Lanes that do not count have found what they look for.
-                let tfar = R::select(
-                    bundle.counts(packet, part),
-                    load_part::<N, R>(&rays.tfar, part),
-                    R::splat(f32::NEG_INFINITY),
-                );
-                bundle.closest[packet][part] = Closest::new(tfar);
+            kept: [[[Default::default(); P]; PACKETS]; K],
+            closest: [[[Closest::new(R::splat(f32::NEG_INFINITY)); P]; PACKETS]; K],
+            reach: [L::splat(f32::INFINITY); K],
+        }
+    }
+
+    /// Puts the rays at their start. Not a part of [`new`](Self::new): what is made by many steps may be copied when it
+    /// is given, and this is large.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        for square in 0..K {
+            let packets = self.rays.len().saturating_sub(square * PACKETS).min(PACKETS);
+            for packet in 0..packets {
+                for part in 0..P {
+                    let rays = &self.rays[square * PACKETS + packet];
+                    let direction = load_part3::<N, R>(&rays.direction, part);
+                    self.kept[square][packet][part] =
+                        M::Test::<N, R>::keep(&direction, self.beam.frame.axes[2]);
+                    // Lanes that do not count have found what they look for.
+                    let tfar = R::select(
+                        self.counts(square, packet, part),
+                        load_part::<N, R>(&rays.tfar, part),
+                        R::splat(f32::NEG_INFINITY),
+                    );
+                    self.closest[square][packet][part] = Closest::new(tfar);
+                }
             }
         }
-        bundle
     }
 
     /// The lanes of a part that count.
     #[inline(always)]
-    fn counts(&self, packet: usize, part: usize) -> R::Mask {
-        R::mask_from_bits(self.active[packet] >> (part * N) & ((1 << N) - 1))
+    fn counts(&self, square: usize, packet: usize, part: usize) -> R::Mask {
+        R::mask_from_bits(self.active[square][packet] >> (part * N) & ((1 << N) - 1))
     }
 
     /// A part's test.
     #[inline(always)]
-    fn part_test(&self, packet: usize, part: usize) -> M::Test<N, R> {
-        let direction = load_part3::<N, R>(&self.rays[packet].direction, part);
-        let kept = &self.kept[packet][part];
+    fn part_test(&self, square: usize, packet: usize, part: usize) -> M::Test<N, R> {
+        let direction = load_part3::<N, R>(&self.rays[square * PACKETS + packet].direction, part);
+        let kept = &self.kept[square][packet][part];
         M::Test::<N, R>::revive(kept, &self.beam.frame.apex, &direction, self.beam.frame.axes[2])
     }
 
     /// Writes a packet's hits.
     #[inline(always)]
-    pub fn give(&self, packet: usize, hits: &mut HitPacket<16>) {
+    pub fn give(&self, square: usize, packet: usize, hits: &mut HitPacket<16>) {
         for part in 0..P {
-            let test = self.part_test(packet, part);
+            let test = self.part_test(square, packet, part);
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
-            let found = self.closest[packet][part].records::<T, M>(self.tree, again);
+            let found = self.closest[square][packet][part].records::<T, M>(self.tree, again);
             hits.set_part(part, &found);
         }
     }
 
     /// Draws a packet's reach in to what its rays still look for.
     #[inline(always)]
-    fn shorten(&mut self, packet: usize) {
+    fn shorten(&mut self, square: usize, packet: usize) {
         let mut reach = f32::NEG_INFINITY;
+        let rays = &self.rays[square * PACKETS + packet];
         for part in 0..P {
-            let speed = load_part::<N, R>(&self.rays[packet].direction[self.beam.frame.axes[2]], part).abs();
-            let depth = (self.closest[packet][part].t * speed).greatest();
+            let speed = load_part::<N, R>(&rays.direction[self.beam.frame.axes[2]], part).abs();
+            let depth = (self.closest[square][packet][part].t * speed).greatest();
             reach = if depth > reach { depth } else { reach };
         }
         let reach = L::splat(reach + reach.abs() * ROUNDINGS);
-        self.reach = L::select(L::mask_from_bits(1 << packet), reach, self.reach);
+        self.reach[square] = L::select(L::mask_from_bits(1 << packet), reach, self.reach[square]);
     }
 }
 
-impl<L, R, T, M, const N: usize, const P: usize> Bundle<L> for Nearest<'_, L, R, T, M, N, P>
+impl<L, R, T, M, const N: usize, const P: usize, const K: usize> Bundle<L, K>
+    for Nearest<'_, L, R, T, M, N, P, K>
 where
     L: Sixteen,
     R: Lanes<N>,
@@ -132,16 +143,21 @@ where
     const WIDEST: f32 = f32::INFINITY;
 
     #[inline(always)]
-    fn reach(&self) -> L {
-        self.reach
+    fn reach(&self, square: usize) -> L {
+        self.reach[square]
     }
 
     #[inline(always)]
-    fn test(&mut self, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
+    fn reach_of_lanes(&self) -> L {
+        greatest_of_lanes(&self.reach)
+    }
+
+    #[inline(always)]
+    fn test(&mut self, square: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
         let packet = packet & 15;
         let mut changed = false;
         let [i, j, k] = self.beam.frame.axes;
-        let rays = &self.rays[packet];
+        let rays = &self.rays[square * PACKETS + packet];
         for part in 0..P {
             let direction = [
                 load_part::<N, R>(&rays.direction[i], part),
@@ -149,50 +165,54 @@ where
                 load_part::<N, R>(&rays.direction[k], part),
             ];
             let tnear = load_part::<N, R>(&rays.tnear, part);
-            let live = self.counts(packet, part);
+            let live = self.counts(square, packet, part);
             for triangle in bits(chosen) {
-                let (primitive, kept) = (primitives[triangle], &self.kept[packet][part]);
+                let (primitive, kept) = (primitives[triangle], &self.kept[square][packet][part]);
                 // No `unwrap_or_else`: its closure might stay out of line, and be compiled without the
                 // instruction set.
                 let told = M::Test::<N, R>::test_placed(kept, &direction, &block.placed, triangle, live);
                 let candidate = match told {
                     Some(candidate) => candidate,
-                    None => self.part_test(packet, part).test(self.tree.record_of(primitive), live),
+                    None => self.part_test(square, packet, part).test(self.tree.record_of(primitive), live),
                 };
-                let closest = &mut self.closest[packet][part];
+                let closest = &mut self.closest[square][packet][part];
                 changed |=
                     closest.take::<false>(&candidate, primitive, tnear, live, !M::Test::<N, R>::DEFERS);
             }
         }
         if changed {
-            self.shorten(packet);
+            self.shorten(square, packet);
         }
     }
 
     #[inline(always)]
-    fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
+    fn go_alone(&mut self, square: usize, packet: usize, place: usize, tmin: f32, tmax: f32) {
+        // A lane may hold packets that are not there.
+        if self.active[square][packet] == 0 {
+            return;
+        }
         let mut changed = false;
         for part in 0..P {
-            let rays = self.rays[packet].part::<N>(part);
-            let active = self.active[packet] >> (part * N) & ((1 << N) - 1);
+            let rays = self.rays[square * PACKETS + packet].part::<N>(part);
+            let active = self.active[square][packet] >> (part * N) & ((1 << N) - 1);
             let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
             let speed = R::load(&rays.direction[self.beam.frame.axes[2]]).abs();
-            let mut closest = self.closest[packet][part];
+            let mut closest = self.closest[square][packet][part];
             let interval = Interval {
                 tmin: (R::splat(tmin - tmin.abs() * ROUNDINGS) / speed).max(inside.tmin),
                 tmax: (R::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(closest.t),
             };
             if interval.live().any() {
-                let test = self.part_test(packet, part);
+                let test = self.part_test(square, packet, part);
                 let tnear = R::load(&rays.tnear);
                 let node = self.tree.beneath(place);
                 descend::<N, R, T, M, false>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
-                self.closest[packet][part] = closest;
+                self.closest[square][packet][part] = closest;
                 changed = true;
             }
         }
         if changed {
-            self.shorten(packet);
+            self.shorten(square, packet);
         }
     }
 }

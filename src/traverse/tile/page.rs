@@ -2,9 +2,9 @@
 //! tested.
 
 use super::FEW;
-use super::beam::{Beam, PACKETS};
-use super::bundle::Bundle;
-use super::outline::{Block, Window};
+use super::beam::{Beam, Extent, PACKETS};
+use super::bundle::{Bundle, packet_of, packets_of};
+use super::outline::{Block, Outline, Window};
 use super::probe::Probe;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Tree;
@@ -18,6 +18,9 @@ const BLOCK_WORK: u32 = 12;
 const CULL_WORK: u32 = 3;
 const TEST_WORK: u32 = 4;
 
+/// So many triangles, or fewer, are culled for packets at once, and not for a wide beam's squares before.
+const FEW_TRIANGLES: u32 = 2;
+
 /// A subtree that waits for its turn, with the packets' depths in it.
 #[derive(Clone, Copy)]
 struct Waiting<L> {
@@ -25,28 +28,63 @@ struct Waiting<L> {
     interval: Interval<L>,
 }
 
+/// What a square's packets see of a page, depths alone.
+#[derive(Clone, Copy)]
+struct Part<L> {
+    nearest: L,
+    farthest: L,
+    /// The packets for which that is anything.
+    live: u32,
+    /// What they see together, once it is asked for.
+    all: Option<Window<L>>,
+}
+
+/// What a square's packets see of a block.
+struct View<'a, L> {
+    square: usize,
+    window: &'a Window<L>,
+    /// The packets that see anything.
+    live: u32,
+}
+
+/// What is left of a block.
+struct Left<'a, L, const PARALLEL: bool> {
+    outline: &'a Outline<L, PARALLEL>,
+    /// The ids of all of its triangles.
+    primitives: &'a [u32],
+    /// Those that are left.
+    triangles: u32,
+}
+
 /// A bundle of rays on its way down the upper tree.
-pub struct Descent<'a, L, T, const PARALLEL: bool> {
+pub struct Descent<'a, L, T, const PARALLEL: bool, const K: usize> {
     tree: &'a T,
     beam: &'a Beam<L, PARALLEL>,
-    /// What the packets see of the scene, depths apart.
-    window: Window<L>,
+    /// What the lanes see of the scene, depths apart.
+    lanes: Window<L>,
+    /// What each square's packets do. A square alone is what the lanes are.
+    squares: &'a [Window<L>; K],
     block: Block,
     /// What was done so far.
     work: u32,
 }
 
-impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> {
+impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, L, T, PARALLEL, K> {
     #[inline(always)]
-    pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>) -> Self {
+    pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>, squares: &'a [Window<L>; K]) -> Self {
         let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
-        let window = Window::new(beam.low, beam.high, never, ever, beam.spread.blur::<PARALLEL>());
-        Self { tree, beam, window, block: Block::new(), work: 0 }
+        let lanes = Window::new(beam.low, beam.high, never, ever, beam.spread.blur::<PARALLEL>());
+        Self { tree, beam, lanes, squares, block: Block::new(), work: 0 }
     }
 
     /// Walks the upper tree with all packets of a tile, in which they are in `interval`.
     #[inline(always)]
-    pub fn walk<B: Bundle<L>, P: Probe>(mut self, bundle: &mut B, mut interval: Interval<L>, probe: &mut P) {
+    pub fn walk<B: Bundle<L, K>, P: Probe>(
+        mut self,
+        bundle: &mut B,
+        mut interval: Interval<L>,
+        probe: &mut P,
+    ) {
         let (tree, beam) = (self.tree, self.beam);
         let mut live = interval.live().bits();
         if live == 0 {
@@ -106,8 +144,8 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
             // Where it does not pay, each packet goes on alone from the start, with what was found as its
             // bound.
             self.work += nodes;
-            if self.work > B::PATIENCE {
-                let rest = Interval { tmin: start.tmin, tmax: bundle.reach().min(start.tmax) };
+            if self.work > B::PATIENCE * K as u32 {
+                let rest = Interval { tmin: start.tmin, tmax: bundle.reach_of_lanes().min(start.tmax) };
                 go_alone(bundle, &rest, start.live().bits(), 0, probe);
                 return;
             }
@@ -115,7 +153,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
             // Take up the next subtree that some packet can still find something in.
             loop {
                 let Some(next) = stack.pop() else { return };
-                let tmax = bundle.reach().min(next.interval.tmax);
+                let tmax = bundle.reach_of_lanes().min(next.interval.tmax);
                 interval = Interval { tmin: next.interval.tmin, tmax };
                 live = interval.live().bits();
                 if live != 0 {
@@ -129,7 +167,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
 
     /// Looks for hits among a page's triangles, for the packets in `live` in their depths.
     #[inline(always)]
-    fn visit<B: Bundle<L>, P: Probe>(
+    fn visit<B: Bundle<L, K>, P: Probe>(
         &mut self,
         bundle: &mut B,
         page: &[u32],
@@ -141,13 +179,16 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
             return;
         }
         probe.page(live.count_ones());
-        let mut window = self.window;
-        (window.nearest, window.farthest) = (interval.tmin, interval.tmax);
-        let all = union(&window, L::mask_from_bits(live), self.beam.spread.blur::<PARALLEL>());
+        let blur = self.beam.spread.blur::<PARALLEL>();
+        let lanes = Window { nearest: interval.tmin, farthest: interval.tmax, ..self.lanes };
+        let all = union(&lanes, L::mask_from_bits(live), blur);
+
+        let mut window = lanes;
+        let mut squares = None;
         let mut blocks = page.chunks(16);
         let mut next = blocks.next();
         while let Some(primitives) = next {
-            if self.work > B::PATIENCE {
+            if self.work > B::PATIENCE * K as u32 {
                 return;
             }
             next = blocks.next();
@@ -169,51 +210,128 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool> Descent<'a, L, T, PARALLEL> 
             }
             self.block.keep(&outline, &self.beam.frame);
 
-            // Cull for packets, the rarer of packets and triangles one by one.
-            self.work += left.count_ones().min(live.count_ones()) * CULL_WORK;
-            let mut chosen = [0; PACKETS];
-            if left.count_ones() <= live.count_ones() {
-                for triangle in bits(left) {
-                    let outline = self.block.one::<L, PARALLEL>(triangle);
-                    for packet in bits(outline.meets(&window).bits() & live) {
-                        chosen[packet & 15] |= 1 << triangle;
+            if K == 1 {
+                let view = View { square: 0, window: &window, live };
+                let left = Left { outline: &outline, primitives, triangles: left };
+                self.visit_square(bundle, &view, &left, probe);
+                window.farthest = bundle.reach(0).min(window.farthest);
+                continue;
+            }
+            let squares: &mut [Part<L>; K] = match &mut squares {
+                Some(squares) => squares,
+                none => none.insert(self.parts(bundle, interval, live)),
+            };
+            for square in 0..K {
+                let part = &mut squares[square];
+                if part.live == 0 {
+                    continue;
+                }
+                // Cull for the square, if that may spare more than it takes.
+                let window =
+                    Window { nearest: part.nearest, farthest: part.farthest, ..self.squares[square] };
+                let mut triangles = left;
+                if triangles.count_ones() > FEW_TRIANGLES {
+                    let all = match part.all {
+                        Some(all) => all,
+                        None => union(&window, L::mask_from_bits(part.live), blur),
+                    };
+                    part.all = Some(all);
+                    triangles &= outline.meets(&all).bits();
+                    if triangles == 0 {
+                        continue;
                     }
                 }
-            } else {
-                let rows = window.rows();
-                for packet in bits(live) {
-                    chosen[packet & 15] = outline.meets(&rows.one(packet)).bits() & left;
-                }
+                let view = View { square, window: &window, live: part.live };
+                let left = Left { outline: &outline, primitives, triangles };
+                self.visit_square(bundle, &view, &left, probe);
+                part.farthest = bundle.reach(square).min(part.farthest);
             }
+        }
+    }
 
-            // Test what is left.
-            for packet in bits(live) {
-                let chosen = chosen[packet & 15];
-                if chosen != 0 {
-                    self.work += chosen.count_ones() * TEST_WORK;
-                    probe.tests(chosen.count_ones());
-                    bundle.test(packet, &self.block, primitives, chosen);
+    /// What the squares' packets see between the depths in which the lanes in `live` are in a page.
+    #[inline(always)]
+    fn parts<B: Bundle<L, K>>(&self, bundle: &B, interval: &Interval<L>, live: u32) -> [Part<L>; K] {
+        let mut parts = [Part { nearest: interval.tmin, farthest: interval.tmax, live, all: None }; K];
+        for square in 0..K {
+            let part = &mut parts[square];
+            part.nearest = interval.tmin.spread(square);
+            part.farthest = bundle.reach(square).min(interval.tmax.spread(square));
+            part.live = packets_of::<K>(live, square) & part.nearest.le(part.farthest).bits();
+        }
+        parts
+    }
+
+    /// Looks for hits of a square's packets among the triangles that are left of a block.
+    #[inline(always)]
+    fn visit_square<B: Bundle<L, K>, P: Probe>(
+        &mut self,
+        bundle: &mut B,
+        view: &View<'_, L>,
+        left: &Left<'_, L, PARALLEL>,
+        probe: &mut P,
+    ) {
+        let View { square, window, live } = *view;
+        let Left { outline, primitives, triangles } = *left;
+
+        // Cull for packets, the rarer of packets and triangles one by one.
+        self.work += triangles.count_ones().min(live.count_ones()) * CULL_WORK;
+        let mut chosen = [0; PACKETS];
+        if triangles.count_ones() <= live.count_ones() {
+            for triangle in bits(triangles) {
+                let outline = self.block.one::<L, PARALLEL>(triangle);
+                for packet in bits(outline.meets(window).bits() & live) {
+                    chosen[packet & 15] |= 1 << triangle;
                 }
             }
-            window.farthest = bundle.reach().min(window.farthest);
+        } else {
+            let rows = window.rows();
+            for packet in bits(live) {
+                chosen[packet & 15] = outline.meets(&rows.one(packet)).bits() & triangles;
+            }
+        }
+
+        // Test what is left.
+        for packet in bits(live) {
+            let chosen = chosen[packet & 15];
+            if chosen != 0 {
+                self.work += chosen.count_ones() * TEST_WORK;
+                probe.tests(chosen.count_ones());
+                bundle.test(square, packet, &self.block, primitives, chosen);
+            }
         }
     }
 }
 
 /// Packets go on alone below a place of the upper tree.
 #[inline(always)]
-fn go_alone<L: Sixteen, B: Bundle<L>, P: Probe>(
+fn go_alone<L: Sixteen, B: Bundle<L, K>, P: Probe, const K: usize>(
     bundle: &mut B,
     interval: &Interval<L>,
-    packets: u32,
+    lanes: u32,
     place: usize,
     probe: &mut P,
 ) {
-    probe.alone(packets.count_ones());
+    probe.alone(lanes.count_ones() * K as u32);
     let (tmin, tmax) = (interval.tmin.store(), interval.tmax.store());
-    for packet in bits(packets) {
-        bundle.go_alone(packet & 15, place, tmin[packet & 15], tmax[packet & 15]);
+    for lane in bits(lanes) {
+        for k in 0..K {
+            let (square, packet) = packet_of::<K>(lane & 15, k);
+            bundle.go_alone(square, packet, place, tmin[lane & 15], tmax[lane & 15]);
+        }
     }
+}
+
+/// What squares' packets see of the scene, depths apart.
+#[inline(always)]
+pub fn windows<L: Sixteen, const K: usize>(extents: &[Extent<L>; K], blur: f32) -> [Window<L>; K] {
+    let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
+    let mut windows = [Window::new(extents[0].low, extents[0].high, never, ever, blur); K];
+    for square in 1..K {
+        let Extent { low, high, .. } = extents[square];
+        windows[square] = Window::new(low, high, never, ever, blur);
+    }
+    windows
 }
 
 /// What some of a window's packets see together.

@@ -19,7 +19,7 @@ use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk};
 use std::marker::PhantomData;
 
-/// Up to sixteen packets. Rays stand in the lanes of `R`, as many as a register holds.
+/// A square's packets. Rays stand in the lanes of `R`, as many as a register holds.
 pub struct Shadows<'a, L, R, T, M, const N: usize, const PARALLEL: bool>
 where
     L: Sixteen,
@@ -97,7 +97,7 @@ where
     }
 }
 
-impl<L, R, T, M, const N: usize, const PARALLEL: bool> Bundle<L> for Shadows<'_, L, R, T, M, N, PARALLEL>
+impl<L, R, T, M, const N: usize, const PARALLEL: bool> Bundle<L, 1> for Shadows<'_, L, R, T, M, N, PARALLEL>
 where
     L: Sixteen,
     R: Lanes<N>,
@@ -112,12 +112,17 @@ where
     const WIDEST: f32 = if PARALLEL { f32::INFINITY } else { 0.1 };
 
     #[inline(always)]
-    fn reach(&self) -> L {
+    fn reach(&self, _: usize) -> L {
         L::load(&self.reach)
     }
 
     #[inline(always)]
-    fn test(&mut self, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
+    fn reach_of_lanes(&self) -> L {
+        L::load(&self.reach)
+    }
+
+    #[inline(always)]
+    fn test(&mut self, _: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
         let packet = packet & 15;
         for part in 0..16 / N {
             let lanes = self.open_in(packet, part);
@@ -177,7 +182,7 @@ where
     }
 
     #[inline(always)]
-    fn go_alone(&mut self, packet: usize, place: usize, tmin: f32, tmax: f32) {
+    fn go_alone(&mut self, _: usize, packet: usize, place: usize, tmin: f32, tmax: f32) {
         for part in 0..16 / N {
             let lanes = self.open_in(packet, part);
             if lanes == 0 {

@@ -51,9 +51,14 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     }
 
     #[inline(always)]
+    fn sift(&self, triangle: &Triangle, lanes: L::Mask) -> L::Mask {
+        self.shear.likely(&triangle.corners) & lanes
+    }
+
+    #[inline(always)]
     fn test(&self, triangle: &Triangle, lanes: L::Mask) -> Candidate<W, L> {
         let corners = &triangle.corners;
-        let likely = self.shear.likely(corners) & lanes;
+        let likely = self.sift(triangle, lanes);
         if !likely.any() {
             return Candidate::none(likely);
         }

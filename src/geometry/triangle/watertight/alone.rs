@@ -146,6 +146,8 @@ mod tests {
             let (answers, open) = chosen.run(Eights(&ray, &triangles, ends));
             for lane in 0..8 {
                 let one = ray.test(triangles[lane], true);
+                assert!(ray.sift(triangles[lane], true) | !one.inside, "sifted away: {:?}", corners[lane]);
+                assert!(!ray.sift(triangles[lane], false), "of a lane that is not asked for");
                 let wanted =
                     (one.inside && ends[0] <= one.t && one.t <= ends[1]).then_some([one.t, one.u, one.v]);
                 let bits = |answer: Option<[f32; 3]>| answer.map(|numbers| numbers.map(f32::to_bits));

@@ -185,6 +185,14 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
         self.decide(triangle, [self.sheared(a), self.sheared(b), self.sheared(c)], lanes)
     }
 
+    /// The signs of the edge functions before any is looked at in double precision: that takes lanes out, and never one in.
+    #[inline(always)]
+    fn sift(&self, triangle: &Triangle, lanes: L::Mask) -> L::Mask {
+        let [a, b, c] = &triangle.corners;
+        let (a, b, c) = (self.sheared(a), self.sheared(b), self.sheared(c));
+        lanes & one_sign(&edges(&[a, b, c]))
+    }
+
     #[inline(always)]
     fn weigh(&self, triangle: &Triangle, lanes: L::Mask) -> [L; 2] {
         let [a, b, c] = &triangle.corners;
@@ -220,28 +228,38 @@ impl<const W: usize, L: Lanes<W>> Shear<W, L> {
     }
 }
 
+/// The edge functions of a triangle with its corners sheared, each opposite to the corner whose weight it is.
+#[inline(always)]
+fn edges<const W: usize, L: Lanes<W>>([[ax, ay, _], [bx, by, _], [cx, cy, _]]: &[Lanes3<L>; 3]) -> Lanes3<L> {
+    [*cx * *by - *cy * *bx, *ax * *cy - *ay * *cx, *bx * *ay - *by * *ax]
+}
+
+/// The lanes in which all are of one sign, zeros allowed: not both a negative and a positive one.
+#[inline(always)]
+fn one_sign<const W: usize, L: Lanes<W>>([a, b, c]: &Lanes3<L>) -> L::Mask {
+    let zero = L::splat(0.0);
+    !((a.min(*b).min(*c).lt(zero)) & zero.lt(a.max(*b).max(*c)))
+}
+
 /// Which of the lanes in `lanes` are inside of a triangle with its corners sheared; the edge functions, each
 /// opposite to the corner whose weight it is, and their sum.
 #[inline(always)]
 fn edge_functions<const W: usize, L: Lanes<W>>(
-    [[ax, ay, _], [bx, by, _], [cx, cy, _]]: &[Lanes3<L>; 3],
+    corners: &[Lanes3<L>; 3],
     lanes: L::Mask,
 ) -> (L::Mask, Lanes3<L>, L) {
-    let mut a = *cx * *by - *cy * *bx;
-    let mut b = *ax * *cy - *ay * *cx;
-    let mut c = *bx * *ay - *by * *ax;
-
-    // All of one sign, zeros allowed: not both a negative and a positive one.
-    let zero = L::splat(0.0);
-    let mut inside = lanes & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+    let [mut a, mut b, mut c] = edges(corners);
+    let mut inside = lanes & one_sign(&[a, b, c]);
 
     // Where an edge function is zero, its sign is not known: ask double precision.
+    let zero = L::splat(0.0);
     let unsure = (a.eq(zero) | b.eq(zero) | c.eq(zero)) & inside;
     if unsure.any() {
+        let [[ax, ay, _], [bx, by, _], [cx, cy, _]] = corners;
         let sheared = [ax.store(), ay.store(), bx.store(), by.store(), cx.store(), cy.store()];
         let edges = edges_in_double(unsure.bits(), &sheared, [a.store(), b.store(), c.store()]);
         (a, b, c) = (L::load(&edges[0]), L::load(&edges[1]), L::load(&edges[2]));
-        inside = inside & !((a.min(b).min(c).lt(zero)) & zero.lt(a.max(b).max(c)));
+        inside = inside & one_sign(&[a, b, c]);
     }
 
     // The weights' sum is zero for a triangle seen edge-on, NaN where anything was NaN.

@@ -2,7 +2,7 @@
 
 use super::participants::Participant;
 use crate::geometry::Ray;
-use crate::study::bench::engine::{CHUNK, Contender, Results};
+use crate::study::bench::engine::{CHUNK, Contender, Results, chunk_of};
 use crate::study::bench::race::{Entry, Pace, Speed, race};
 
 /// Chunks that the heats are run on.
@@ -36,7 +36,7 @@ pub fn race_modes(
         .collect();
     let entries: Vec<Entry> =
         (0..contenders.len()).map(|engine| Entry { engine, qualifies: false }).collect();
-    let chunks = rays.len().div_ceil(CHUNK);
+    let chunks = rays.len().div_ceil(chunk_of(rays.len()));
     let speeds = race(&contenders, &entries, rays.len(), chunks, threads, pace);
     let results = |contender: &dyn Contender| {
         (0..chunks).for_each(|chunk| contender.trace(chunk));
@@ -66,7 +66,8 @@ fn heats(participants: &[Participant], rays: &[Ray], any_hit: bool, threads: usi
         }
     }
     let pace = Pace { rounds: 3, seconds: 0.0, all_modes: false, pin };
-    let speeds = race(&contenders, &entries, part.len(), part.len().div_ceil(CHUNK), threads, &pace);
+    let speeds =
+        race(&contenders, &entries, part.len(), part.len().div_ceil(chunk_of(part.len())), threads, &pace);
     let quickest = |engine| {
         let of_engine = entries.iter().zip(&speeds).filter(|(entry, _)| entry.engine == engine);
         let medians = of_engine.map(|(_, speed)| speed.map_or(0.0, |speed| speed.median)).enumerate();

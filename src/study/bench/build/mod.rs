@@ -11,7 +11,7 @@ mod subject;
 pub use report::{Header, Rate, Report, Row, Seconds};
 
 use super::agreement::Agreement;
-use super::engine::CHUNK;
+use super::engine::chunk_of;
 use super::ours::Ours;
 use super::race::{Entry, race};
 use super::{EngineInfo, EngineName, Options, check, machine};
@@ -153,7 +153,7 @@ fn race_kind(built: &[Built], kind: RayKind, rays: &[Ray], options: &Options, re
             entries.push(Entry { engine: number, qualifies: true });
         }
     }
-    let chunks = rays.len().div_ceil(CHUNK);
+    let chunks = rays.len().div_ceil(chunk_of(rays.len()));
     let threads = report.header.ray_threads;
     let speeds = race(&contenders, &entries, rays.len(), chunks, threads, &options.pace);
     let mut found = Vec::new();

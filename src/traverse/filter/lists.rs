@@ -1,0 +1,165 @@
+//! The stack of lists: rays that wait at places of the tree, with their intervals there.
+
+use super::lot::{LOT, Lot};
+use crate::kdtree::{Exit, KdTree};
+use crate::simd::{Dense, Eight, prefetch};
+use std::hint::select_unpredictable;
+
+/// Lines on a way from the root to a leaf.
+const LEVELS: usize = crate::kdtree::MAX_DEPTH.div_ceil(3);
+
+/// Lists that can wait: of the eight exits of each line on a way all but one do; and room for the one that is written in vain.
+pub const DEPTH: usize = (LEVELS * 7 + 2).next_power_of_two();
+
+/// What a list may take beyond its rays: it is written by whole registers.
+pub const SLACK: usize = 16;
+
+/// Entries that so many rays of an octant can take: at each line on a way those of the list that was cut, and up to as many
+/// at each exit.
+const fn room(rays: usize) -> usize {
+    LEVELS * 9 * (rays + 2 * SLACK)
+}
+
+/// Entries that can wait.
+const ENTRIES: usize = (room(LOT) + 7 * room(0)).next_power_of_two();
+
+/// Rays at a place of the tree.
+#[derive(Clone, Copy)]
+pub struct List {
+    /// The place: an exit of a line.
+    pub exit: i32,
+    /// Where the list's first entry is, and how many there are.
+    pub at: u32,
+    pub len: u32,
+}
+
+/// Lists that wait.
+pub struct Heads {
+    exits: [i32; DEPTH + SLACK],
+    ats: [i32; DEPTH + SLACK],
+    lens: [i32; DEPTH + SLACK],
+    count: usize,
+}
+
+/// Their entries: a ray's number and its interval. What stands behind a list's last one means nothing.
+///
+/// Memory that was never written takes none: of what could wait, a hundredth does.
+pub struct Entries {
+    ids: Box<[i32; ENTRIES + SLACK]>,
+    tmin: Box<[f32; ENTRIES + SLACK]>,
+    tmax: Box<[f32; ENTRIES + SLACK]>,
+}
+
+impl Heads {
+    /// No lists.
+    pub const fn new() -> Self {
+        Self { exits: [0; DEPTH + SLACK], ats: [0; DEPTH + SLACK], lens: [0; DEPTH + SLACK], count: 0 }
+    }
+
+    /// Takes the list on top.
+    #[inline(always)]
+    pub fn pop(&mut self) -> Option<List> {
+        self.count = self.count.checked_sub(1)?;
+        let place = self.count % DEPTH;
+        Some(List { exit: self.exits[place], at: self.ats[place] as u32, len: self.lens[place] as u32 })
+    }
+
+    /// Puts the list that was taken back.
+    #[inline(always)]
+    pub fn keep(&mut self) {
+        self.count += 1;
+    }
+
+    /// Fetches what the list on top will need. (If there is none, something else.)
+    #[inline(always)]
+    pub fn fetch(&self, tree: &KdTree) {
+        let exit = Exit(self.exits[self.count.wrapping_sub(1) % DEPTH]);
+        let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
+        let record = tree.references().as_ptr().wrapping_add(exit.record());
+        prefetch(select_unpredictable(exit.is_leaf(), record, line));
+    }
+
+    /// Puts lists of one ray each on top, one behind the other from `at` on: a list for each lane whose bit is set.
+    #[inline(always)]
+    pub fn push_each<L: Eight>(&mut self, exits: L::Ids, bits: u32, at: usize) {
+        let (place, room) = (self.count % DEPTH, "a register behind each");
+        L::ids_compact(exits, bits, self.exits[place..].first_chunk_mut().expect(room));
+        for lane in 0..8 {
+            (self.ats[place + lane], self.lens[place + lane]) = ((at + lane) as i32, 1);
+        }
+        self.count += bits.count_ones() as usize;
+    }
+
+    /// Puts a list on top, unless it is empty.
+    #[inline(always)]
+    pub fn push(&mut self, exit: i32, at: usize, len: usize) {
+        let place = self.count % DEPTH;
+        (self.exits[place], self.ats[place], self.lens[place]) = (exit, at as i32, len as i32);
+        self.count += usize::from(len != 0);
+    }
+}
+
+impl Entries {
+    /// None.
+    pub fn new() -> Self {
+        let room = "as many as asked for";
+        Self {
+            ids: vec![0; ENTRIES + SLACK].try_into().expect(room),
+            tmin: vec![0.0; ENTRIES + SLACK].try_into().expect(room),
+            tmax: vec![0.0; ENTRIES + SLACK].try_into().expect(room),
+        }
+    }
+
+    /// Writes the rays of an octant from `at` on, where they are inside the scene's bounds; where the next octant's
+    /// may begin.
+    #[inline(always)]
+    pub fn begin(&mut self, rays: &[i32], lot: &Lot, at: usize) -> usize {
+        for (i, &id) in rays.iter().enumerate() {
+            let (place, ray) = ((at + i) % ENTRIES, id as usize % LOT);
+            (self.ids[place], self.tmin[place], self.tmax[place]) = (id, lot.tmin[ray], lot.tmax[ray]);
+        }
+        at + room(rays.len())
+    }
+
+    /// Some rays' numbers, and their intervals.
+    #[inline(always)]
+    pub fn load<const W: usize, L: Dense<W>>(&self, at: usize) -> ([i32; W], L, L) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        let ids = *self.ids[at..].first_chunk().expect(room);
+        let tmin = L::load(self.tmin[at..].first_chunk().expect(room));
+        let tmax = L::load(self.tmax[at..].first_chunk().expect(room));
+        (ids, tmin, tmax)
+    }
+
+    /// One ray's number, and its interval.
+    #[inline(always)]
+    pub fn one(&self, at: usize) -> (i32, f32, f32) {
+        let at = at % ENTRIES;
+        (self.ids[at], self.tmin[at], self.tmax[at])
+    }
+
+    /// Writes one ray's intervals whose bits are set one behind the other.
+    #[inline(always)]
+    pub fn write_each<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L, tmax: L) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        *self.ids[at..].first_chunk_mut().expect(room) = [id; 8];
+        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
+        tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
+    }
+
+    /// Writes those of some rays whose bits are set one behind the other.
+    #[inline(always)]
+    pub fn write<const W: usize, L: Dense<W>>(
+        &mut self,
+        at: usize,
+        bits: u32,
+        ids: L::Ids,
+        tmin: L,
+        tmax: L,
+    ) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
+        tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
+        tmax.close_up(bits, self.tmax[at..].first_chunk_mut().expect(room));
+    }
+}

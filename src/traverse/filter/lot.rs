@@ -1,0 +1,253 @@
+//! A lot of rays: where each starts, how it runs, and what it has found.
+
+use crate::geometry::triangle::{Mode, Test};
+use crate::geometry::{Aabb, Ray};
+use crate::kdtree::Line;
+use crate::simd::{Dense, Eight, Lanes, Mask};
+use crate::traverse::closest::{Closest, NONE};
+use crate::traverse::lanes::RayPacket;
+use crate::traverse::range::{LEAST, LIMIT};
+use crate::traverse::stream::step::Planes;
+use crate::traverse::walk::{FLATTEST, MARGIN, load3};
+
+/// Rays in a lot.
+pub const LOT: usize = 4096;
+
+/// A ray on its way, in half a cache line.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+struct Traveller {
+    /// Its origin, and what a hit must not lie beyond: the closest `t`, or `tfar`. Of a ray that is done less than
+    /// anything.
+    start: [f32; 4],
+    /// 1 / direction, and the bits of the closest triangle's id, or of [`NONE`].
+    inverse: [f32; 4],
+}
+
+/// Rays of a list as planes see them.
+pub struct Crossing<L> {
+    pub origin: [L; 3],
+    pub inverse: [L; 3],
+    /// The walls' half-thickness in units of the parameter.
+    pub margin: [L; 3],
+    /// Where each ray ends.
+    pub closest: L,
+}
+
+/// The rays.
+pub struct Lot {
+    travellers: [Traveller; LOT],
+    /// Their directions, and `tnear`.
+    ways: [[f32; 4]; LOT],
+    /// Where each ray is inside the scene's bounds.
+    pub tmin: [f32; LOT],
+    pub tmax: [f32; LOT],
+    /// The rays that run into each octant, and how many these are. Bit 0 of an octant's number says that they run down
+    /// along x.
+    octants: [[i32; LOT]; 8],
+    counts: [usize; 8],
+    /// For each eight rays, those whose numbers lie near the ends of the floats' range, or that are none.
+    odd: [u8; LOT / 8],
+    /// Half the thickness of walls: that of the ray to which the scene reaches farthest.
+    thickness: f32,
+}
+
+impl Lot {
+    /// A lot that nothing is known of.
+    pub const fn new() -> Self {
+        Self {
+            travellers: [Traveller { start: [0.0; 4], inverse: [0.0; 4] }; LOT],
+            ways: [[0.0; 4]; LOT],
+            tmin: [0.0; LOT],
+            tmax: [0.0; LOT],
+            octants: [[0; LOT]; 8],
+            counts: [0; 8],
+            odd: [0; LOT / 8],
+            thickness: 0.0,
+        }
+    }
+
+    /// Takes so many rays to be odd, all of them.
+    pub fn leave(&mut self, count: usize) {
+        self.odd[..count.div_ceil(8)].fill(0xff);
+        if !count.is_multiple_of(8) {
+            self.odd[count / 8] = (1 << (count % 8)) - 1;
+        }
+        for traveller in &mut self.travellers[..count.next_multiple_of(8)] {
+            traveller.inverse[3] = f32::from_bits(NONE as u32);
+        }
+    }
+
+    /// Makes up to [`LOT`] rays ready.
+    #[inline(always)]
+    pub fn prepare<L: Eight>(&mut self, rays: &[Ray], bounds: &Aabb) {
+        self.counts = [0; 8];
+        let mut greatest_reach = L::splat(0.0);
+        for (eight, rays) in rays.chunks(8).enumerate() {
+            let reach = self.prepare_eight::<L>(rays, eight % (LOT / 8), bounds);
+            greatest_reach = reach.max(greatest_reach);
+        }
+        self.thickness = greatest_reach.greatest() * MARGIN;
+    }
+
+    /// Up to eight of them; how far the scene reaches from each of those that meet it.
+    #[inline(always)]
+    fn prepare_eight<L: Eight>(&mut self, rays: &[Ray], eight: usize, bounds: &Aabb) -> L {
+        let packet = RayPacket::<8>::of_slice(rays);
+        let present = (1u32 << rays.len().min(8)) - 1;
+        let zero = L::splat(0.0);
+        let (origin, direction) = (load3::<8, L>(&packet.origin), load3::<8, L>(&packet.direction));
+        let longest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+        let (tnear, tfar) = (L::load(&packet.tnear), L::load(&packet.tfar));
+
+        // As in `walk.rs`. What is compared with a NaN is odd.
+        let mut ordinary = L::splat(LEAST).le(longest) & tnear.le(tfar);
+        let mut reach = zero;
+        let mut inverse = [zero; 3];
+        let flattest = longest * L::splat(FLATTEST);
+        for axis in 0..3 {
+            let speed = direction[axis].abs();
+            ordinary = ordinary & speed.lt(L::splat(LIMIT)) & origin[axis].abs().le(L::splat(f32::MAX));
+            inverse[axis] = L::splat(1.0) / flattest.max(speed).copysign(direction[axis]);
+            let to_low = (L::splat(bounds.min[axis]) - origin[axis]).abs();
+            let to_high = (L::splat(bounds.max[axis]) - origin[axis]).abs();
+            reach = to_low.max(to_high).max(reach);
+        }
+        let thickness = reach * L::splat(MARGIN);
+        let (mut tmin, mut tmax) = (tnear, L::splat(f32::MAX).min(tfar));
+        let mut down = [0; 3];
+        for axis in 0..3 {
+            let margin = thickness * inverse[axis].abs();
+            let low = (L::splat(bounds.min[axis]) - origin[axis]) * inverse[axis];
+            let high = (L::splat(bounds.max[axis]) - origin[axis]) * inverse[axis];
+            tmin = (low.min(high) - margin).max(tmin);
+            tmax = (low.max(high) + margin).min(tmax);
+            down[axis] = inverse[axis].lt(zero).bits();
+        }
+        let flies = ordinary & tmin.le(tmax);
+        self.odd[eight] = (!ordinary.bits() & present) as u8;
+        let place = 8 * eight;
+        *self.tmin[place..].first_chunk_mut().expect("eights fill the lot") = tmin.store();
+        *self.tmax[place..].first_chunk_mut().expect("eights fill the lot") = tmax.store();
+
+        let closest = L::splat(f32::MAX).min(tfar).store();
+        let inverse = [inverse[0].store(), inverse[1].store(), inverse[2].store()];
+        for (lane, ray) in rays.iter().enumerate().take(8) {
+            self.travellers[place + lane] = Traveller {
+                start: [ray.origin.x, ray.origin.y, ray.origin.z, closest[lane]],
+                inverse: [inverse[0][lane], inverse[1][lane], inverse[2][lane], f32::from_bits(NONE as u32)],
+            };
+            self.ways[place + lane] = [ray.direction.x, ray.direction.y, ray.direction.z, ray.tnear];
+        }
+        // Where no rays are, those of an earlier lot may have found something.
+        for traveller in &mut self.travellers[place + rays.len()..place + 8] {
+            traveller.inverse[3] = f32::from_bits(NONE as u32);
+        }
+        let mut left = flies.bits() & present;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize & 7;
+            left &= left - 1;
+            let octant =
+                (down[0] >> lane & 1 | (down[1] >> lane & 1) << 1 | (down[2] >> lane & 1) << 2) as usize;
+            let count = &mut self.counts[octant];
+            self.octants[octant][*count % LOT] = (place + lane) as i32;
+            *count += 1;
+        }
+        L::select(flies, reach, zero)
+    }
+
+    /// The rays that run into an octant.
+    #[inline(always)]
+    pub fn octant(&self, octant: usize) -> &[i32] {
+        &self.octants[octant][..self.counts[octant]]
+    }
+
+    /// Rays as planes see them.
+    #[inline(always)]
+    pub fn crossing<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> Crossing<L> {
+        let nowhere = &[0.0; 4];
+        let (mut starts, mut inverses) = ([nowhere; W], [nowhere; W]);
+        for lane in 0..W {
+            let traveller = &self.travellers[ids[lane] as usize % LOT];
+            (starts[lane], inverses[lane]) = (&traveller.start, &traveller.inverse);
+        }
+        let [x, y, z, closest] = L::columns(&starts);
+        let [inverse_x, inverse_y, inverse_z, _] = L::columns(&inverses);
+        let thickness = L::splat(self.thickness);
+        let margin = [thickness * inverse_x.abs(), thickness * inverse_y.abs(), thickness * inverse_z.abs()];
+        Crossing { origin: [x, y, z], inverse: [inverse_x, inverse_y, inverse_z], margin, closest }
+    }
+
+    /// A ray as a line's planes see it, and where it ends.
+    #[inline(always)]
+    pub fn planes<L: Eight>(&self, id: i32, line: &Line) -> (Planes<L>, f32) {
+        let traveller = &self.travellers[id as usize % LOT];
+        let exits = L::ids_load(&line.exits);
+        let origin = L::of_fours([&traveller.start; 2]).pick_in_fours(exits);
+        let inverse = L::of_fours([&traveller.inverse; 2]).pick_in_fours(exits);
+        let margin = L::splat(self.thickness) * inverse.abs();
+        (Planes { exits, origin, inverse, margin }, traveller.start[3])
+    }
+
+    /// What rays have found, and where they start.
+    #[inline(always)]
+    pub fn found<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> (Closest<W, L>, [L; 3]) {
+        let nowhere = &[0.0; 4];
+        let mut starts = [nowhere; W];
+        let mut primitives = [0; W];
+        for lane in 0..W {
+            let traveller = &self.travellers[ids[lane] as usize % LOT];
+            starts[lane] = &traveller.start;
+            primitives[lane] = traveller.inverse[3].to_bits() as i32;
+        }
+        let [x, y, z, closest] = L::columns(&starts);
+        (Closest::of_found(closest, L::ids_of(&primitives)), [x, y, z])
+    }
+
+    /// Rays' directions, and `tnear`.
+    #[inline(always)]
+    pub fn ways<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> [L; 4] {
+        let mut ways = [&[0.0; 4]; W];
+        for lane in 0..W {
+            ways[lane] = &self.ways[ids[lane] as usize % LOT];
+        }
+        L::columns(&ways)
+    }
+
+    /// What the rays from number `8 * eight` on have found.
+    #[inline(always)]
+    pub fn closest<L: Eight>(&self, eight: usize) -> Closest<8, L> {
+        let first = 8 * eight as i32;
+        let ids = [first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6, first + 7];
+        self.found::<8, L>(&ids).0
+    }
+
+    /// Keeps what those of some rays have found whose bits are set.
+    #[inline(always)]
+    pub fn keep<const W: usize, L: Lanes<W>>(
+        &mut self,
+        ids: &[i32; W],
+        mut bits: u32,
+        found: &Closest<W, L>,
+    ) {
+        let (t, primitives) = (found.t.store(), found.primitives());
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize % W;
+            bits &= bits - 1;
+            let traveller = &mut self.travellers[ids[lane] as usize % LOT];
+            traveller.start[3] = t[lane];
+            traveller.inverse[3] = f32::from_bits(primitives[lane] as u32);
+        }
+    }
+
+    /// Of the rays from number `8 * eight` on, those that are left to the packet kernel.
+    pub fn odd(&self, eight: usize) -> u32 {
+        u32::from(self.odd[eight])
+    }
+}
+
+/// The test of eight rays, made ready.
+#[inline(always)]
+pub fn test_of<L: Eight, M: Mode>(rays: &RayPacket<8>, active: u32) -> M::Test<8, L> {
+    M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), active)
+}

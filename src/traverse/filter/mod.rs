@@ -1,0 +1,238 @@
+//! The filter kernel: lists of rays, filtered down the tree.
+//!
+//! Rays that bounce off what a picture's square shows run everywhere, and no two of them alike: packets fall apart. But a
+//! thousand of them still visit the same few hundred lines and leaves of the tree, most of these by eight rays and more
+//! (`docs/incoherent.md`). So here it is not rays that walk: a *list* of rays is at a line of the tree, and is cut into
+//! one for each of its eight exits (ray stream filtering: Wald, Gribble, Boulos & Kensler 2007; with an order of its own for
+//! each octant: Barringer & Akenine-Möller 2014; Fuetterling, Lojewski, Pfreundt & Ebert 2015). Lists are always dense:
+//! whatever rays do, registers are full as long as a list is longer than they are.
+//!
+//! 1. [`Lot`]: up to [`LOT`] rays are made ready, and parted by octant, so that all rays of a list come to the same one of
+//!    two cells first.
+//! 2. [`cut`](cut::cut): the list on top of the stack is cut at a line of the tree, eight rays at a time. The lists that come
+//!    out go on the stack, the nearest exit's on top.
+//! 3. [`leaf`]: in a leaf, each triangle is tested against eight rays of the list at once, as by packets.
+//! 4. What rays have found shortens them; rays that nothing is left of drop out of lists as these are cut.
+//!
+//! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
+//! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not
+//! ordinary (`range.rs`) are left to the packet kernel.
+
+mod accel;
+mod cut;
+mod leaf;
+mod lists;
+mod lot;
+
+use super::closest::Closest;
+use super::lanes::RayPacket;
+use super::packet;
+use super::records::Resident;
+use crate::geometry::triangle::Mode;
+use crate::geometry::{Hit, Ray};
+use crate::kdtree::{Exit, Tree};
+use crate::simd::{Eight, Simd};
+use lists::{Entries, Heads};
+use lot::Lot;
+use std::cell::Cell;
+
+pub use lot::LOT;
+
+/// What is asked of each ray.
+pub trait Answers {
+    /// Whether any hit will do.
+    const ANY: bool;
+
+    /// What up to eight rays from number `first` on have found.
+    fn found<L: Eight, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &RayPacket<8>,
+        first: usize,
+        closest: &Closest<8, L>,
+    );
+
+    /// A ray that the packet kernel has to trace.
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>);
+}
+
+/// Records of closest hits.
+pub struct Nearest<'a>(pub &'a mut [Hit]);
+
+impl Answers for Nearest<'_> {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn found<L: Eight, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &RayPacket<8>,
+        first: usize,
+        closest: &Closest<8, L>,
+    ) {
+        let test = lot::test_of::<L, M>(rays, closest.found());
+        let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test));
+        for (lane, hit) in self.0[first..].iter_mut().take(8).enumerate() {
+            *hit = found.get(lane);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>) {
+        self.0[ray] = packet::intersect::<1, f32, _, M>(tree, rays, 1).get(0);
+    }
+}
+
+/// Whether rays hit anything.
+pub struct Any<'a>(pub &'a mut [bool]);
+
+impl Answers for Any<'_> {
+    const ANY: bool = true;
+
+    #[inline(always)]
+    fn found<L: Eight, M: Mode>(
+        &mut self,
+        _tree: &Resident<'_, M::Record>,
+        _rays: &RayPacket<8>,
+        first: usize,
+        closest: &Closest<8, L>,
+    ) {
+        let found = closest.found();
+        for (lane, occluded) in self.0[first..].iter_mut().take(8).enumerate() {
+            *occluded = found >> lane & 1 == 1;
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>) {
+        self.0[ray] = packet::occluded::<1, f32, _, M>(tree, rays, 1) == 1;
+    }
+}
+
+/// What a worker's lots need, too large to be made anew for each call.
+struct Room {
+    lot: Lot,
+    entries: Entries,
+    /// The lists of each octant.
+    heads: [Heads; 8],
+}
+
+thread_local! {
+    static ROOM: Cell<Option<Box<Room>>> = const { Cell::new(None) };
+}
+
+/// Traces rays and gives an answer for each.
+#[inline(always)]
+pub fn trace<S: Simd, M: Mode, A: Answers>(
+    resident: &Resident<'_, M::Record>,
+    rays: &[Ray],
+    answers: &mut A,
+) {
+    // Taken out, not borrowed: a closure would be compiled without the instruction set.
+    let mut boxed = match ROOM.take() {
+        Some(room) => room,
+        None => {
+            Box::new(Room { lot: Lot::new(), entries: Entries::new(), heads: [const { Heads::new() }; 8] })
+        }
+    };
+    let room = &mut *boxed;
+    let is_scaled = !resident.scale().is_none();
+    let mut first = 0;
+    for rays in rays.chunks(LOT) {
+        if is_scaled {
+            room.lot.leave(rays.len());
+        } else {
+            room.lot.prepare::<S::F8>(rays, resident.bounds());
+            if A::ANY {
+                walk::<S, M, true>(resident, room);
+            } else {
+                walk::<S, M, false>(resident, room);
+            }
+        }
+        give::<S, M, A>(resident, rays, first, &room.lot, answers);
+        first += rays.len();
+    }
+    ROOM.set(Some(boxed));
+}
+
+/// Walks the tree with the rays of a lot.
+///
+/// Octants take turns, a list each, so that what a list needs of memory can be fetched while the others have theirs.
+#[inline(always)]
+fn walk<S: Simd, M: Mode, const ANY: bool>(resident: &Resident<'_, M::Record>, room: &mut Room) {
+    let Room { lot, entries, heads } = room;
+    let tree = resident.tree;
+    let (mut waiting, mut fetched) = (0u32, 0u32);
+    let mut at = 0;
+    for octant in 0..8 {
+        let rays = lot.octant(octant);
+        heads[octant].push(0, at, rays.len());
+        at = entries.begin(rays, lot, at);
+        waiting |= u32::from(!rays.is_empty()) << octant;
+    }
+    while waiting != 0 {
+        let mut turn = waiting;
+        while turn != 0 {
+            let octant = turn.trailing_zeros() as usize & 7;
+            turn &= turn - 1;
+            let heads = &mut heads[octant];
+            let Some(list) = heads.pop() else {
+                waiting &= !(1 << octant);
+                continue;
+            };
+            // Sixteen lanes for lists that fill more than half of them.
+            let wide = S::NATIVE == 16 && list.len > 8;
+            let exit = Exit(list.exit);
+            if !exit.is_leaf() {
+                let line = &tree.lines()[exit.line()];
+                if list.len == 1 {
+                    cut::take_one::<S::F8>(line, lot, entries, heads, &list);
+                } else if wide {
+                    cut::cut::<16, S::F16, S::F8>(line, octant, lot, entries, heads, &list);
+                } else {
+                    cut::cut::<8, S::F8, S::F8>(line, octant, lot, entries, heads, &list);
+                }
+                heads.fetch(tree);
+            } else if fetched >> octant & 1 == 0 {
+                leaf::fetch(resident, &list);
+                heads.keep();
+                fetched |= 1 << octant;
+            } else {
+                if wide {
+                    leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, &list);
+                } else {
+                    leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, &list);
+                }
+                heads.fetch(tree);
+                fetched &= !(1 << octant);
+            }
+        }
+    }
+}
+
+/// Gives the answers of a lot's rays, of which the first has the number `first`.
+#[inline(always)]
+fn give<S: Simd, M: Mode, A: Answers>(
+    resident: &Resident<'_, M::Record>,
+    rays: &[Ray],
+    first: usize,
+    lot: &Lot,
+    answers: &mut A,
+) {
+    for (eight, rays) in rays.chunks(8).enumerate() {
+        let packet = RayPacket::<8>::of_slice(rays);
+        answers.found::<S::F8, M>(resident, &packet, first + 8 * eight, &lot.closest::<S::F8>(eight));
+        let mut odd = lot.odd(eight);
+        while odd != 0 {
+            let lane = odd.trailing_zeros() as usize & 7;
+            odd &= odd - 1;
+            let ray = RayPacket::of_slice(&[rays[lane]]);
+            answers.odd::<M>(resident, first + 8 * eight + lane, &ray);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

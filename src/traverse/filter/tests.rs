@@ -1,0 +1,173 @@
+//! What lists of rays are to be, and that none is lost.
+
+use super::cut::{cut, take_one};
+use super::lists::{Entries, Heads, List};
+use super::lot::{LOT, Lot};
+use crate::geometry::{Accuracy, Hit, Ray};
+use crate::kdtree::{BuildParams, Tree};
+use crate::mesh::generate::shapes;
+use crate::simd::{Chosen, Isa, Simd, Task};
+use crate::traverse::{Accel, Kernel};
+use glam::Vec3;
+
+/// Numbers between -1 and 1 that look like chance.
+struct Numbers(f64);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 = (self.0 * 1.3 + 0.618_033_988_749_895).fract();
+        (self.0 * 2.0 - 1.0) as f32
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+/// Rays from near one another, that run everywhere or into one octant; some of them end soon.
+fn rays(count: usize, everywhere: bool, seed: f64) -> Vec<Ray> {
+    let mut numbers = Numbers(seed);
+    (0..count)
+        .map(|i| {
+            let origin = Vec3::splat(0.5) + numbers.vector() * if i % 5 == 0 { 2.0 } else { 0.3 };
+            let way = numbers.vector();
+            let way = if everywhere { way } else { way.abs() * Vec3::new(1.0, -1.0, 1.0) };
+            let end = [f32::INFINITY, 0.3][i % 2];
+            Ray::segment(origin, way, [0.0, 0.05][i / 2 % 2], end)
+        })
+        .collect()
+}
+
+/// What waits after lists of some lengths were cut at the first lines of a tree: exit, ray, and the bits of its interval; and
+/// the same of each ray alone.
+struct Cuts<'a>(&'a Accel, &'a [Ray]);
+
+type Waiting = Vec<(i32, i32, [u32; 2])>;
+
+impl Task for Cuts<'_> {
+    type Output = Vec<[Waiting; 3]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let (tree, rays) = (self.0.tree(), self.1);
+        let mut lot = Box::new(Lot::new());
+        lot.prepare::<S::F8>(rays, tree.bounds());
+        let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
+        for octant in 0..8 {
+            let ids = lot.octant(octant);
+            for (i, line) in tree.lines().iter().take(40).enumerate() {
+                let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
+                let begin = |entries: &mut Entries| {
+                    entries.begin(&ids[..len], &lot, 0);
+                    List { exit: 0, at: 0, len: len as u32 }
+                };
+                let list = begin(&mut entries);
+                cut::<8, S::F8, S::F8>(line, octant, &lot, &mut entries, &mut heads, &list);
+                let by_eights = all(&entries, &mut heads);
+                let list = begin(&mut entries);
+                cut::<16, S::F16, S::F8>(line, octant, &lot, &mut entries, &mut heads, &list);
+                let by_sixteens = all(&entries, &mut heads);
+                let mut alone = Vec::new();
+                for ray in 0..len {
+                    entries.begin(&ids[ray..=ray], &lot, 0);
+                    let list = List { exit: 0, at: 0, len: 1 };
+                    take_one::<S::F8>(line, &lot, &mut entries, &mut heads, &list);
+                    alone.extend(all(&entries, &mut heads));
+                }
+                found.push([by_eights, by_sixteens, alone].map(|mut all| {
+                    all.sort_unstable();
+                    all
+                }));
+            }
+        }
+        found
+    }
+}
+
+/// Takes all lists off the stack, entry by entry.
+fn all(entries: &Entries, heads: &mut Heads) -> Waiting {
+    let mut all = Vec::new();
+    while let Some(list) = heads.pop() {
+        for i in 0..list.len {
+            let (id, tmin, tmax) = entries.one((list.at + i) as usize);
+            all.push((list.exit, id, [tmin.to_bits(), tmax.to_bits()]));
+        }
+    }
+    all
+}
+
+#[test]
+fn a_list_is_cut_as_each_of_its_rays_is() {
+    let accel = Accel::build(&shapes::soup(3000, 1), &BuildParams::default()).expect("a soup has a tree");
+    let rays = rays(2000, true, 0.3);
+    for isa in Isa::available() {
+        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays));
+        assert!(
+            found.iter().map(|[alone, ..]| alone.len()).sum::<usize>() > 10_000,
+            "there is something to cut"
+        );
+        for (i, [by_eights, by_sixteens, alone]) in found.into_iter().enumerate() {
+            assert_eq!(by_eights, alone, "{isa}, by eights, cut {i}");
+            assert_eq!(by_sixteens, alone, "{isa}, by sixteens, cut {i}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_left_of_an_earlier_lot() {
+    let build = |triangles| {
+        Accel::build(&shapes::soup(triangles, 3), &BuildParams::default()).expect("a soup has a tree")
+    };
+    let (large, small) = (build(3000), build(1));
+    let rays = rays(LOT, true, 0.7);
+    let mut hits = vec![Hit::MISS; LOT];
+    large.intersect_many(Kernel::Filter, &rays, &mut hits);
+    assert!(hits.iter().any(|hit| hit.is_hit() && hit.primitive > 0));
+    for count in 1..20 {
+        let (mut alone, mut hits) = (vec![Hit::MISS; count], vec![Hit::MISS; count]);
+        small.intersect_many(Kernel::Single, &rays[..count], &mut alone);
+        small.intersect_many(Kernel::Filter, &rays[..count], &mut hits);
+        assert_eq!(hits, alone);
+    }
+}
+
+#[test]
+fn every_ray_of_every_lot_is_answered_as_alone() {
+    let tree = Accel::build(&shapes::soup(3000, 2), &BuildParams::default()).expect("a soup has a tree");
+    let mut odd = rays(61, true, 0.9);
+    for (i, ray) in odd.iter_mut().enumerate() {
+        match i % 6 {
+            0 => ray.direction *= 1e-37,
+            1 => ray.direction *= 1e36,
+            2 => ray.origin.y = f32::NAN,
+            3 => ray.tnear = ray.tfar + 1.0,
+            4 => ray.direction = Vec3::ZERO,
+            _ => ray.tnear = -3.0,
+        }
+    }
+    let sets = [
+        rays(2 * LOT + 37, true, 0.1),
+        // As many as a lot holds run into one octant.
+        rays(LOT, false, 0.2),
+        rays(3, true, 0.4),
+        Vec::new(),
+        odd,
+    ];
+    for rays in &sets {
+        for isa in Isa::available() {
+            for accuracy in Accuracy::ALL {
+                let accel = tree.clone().with_isa(isa).with_accuracy(accuracy);
+                let (mut alone, mut hits) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+                accel.intersect_many(Kernel::Single, rays, &mut alone);
+                accel.intersect_many(Kernel::Filter, rays, &mut hits);
+                assert!(hits == alone, "{} rays on {isa}, {accuracy}", rays.len());
+                let mut occluded = vec![false; rays.len()];
+                accel.occluded_many(Kernel::Filter, rays, &mut occluded);
+                assert!(occluded.iter().zip(&alone).all(|(&occluded, hit)| occluded == hit.is_hit()));
+            }
+        }
+    }
+    let mut hits = vec![Hit::MISS; LOT];
+    tree.intersect_many(Kernel::Filter, &sets[1], &mut hits);
+    assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 100, "there is something to hit");
+}
