@@ -1,7 +1,7 @@
 //! The filter kernel: lists of rays, filtered down the tree.
 //!
-//! Rays that bounce off what a picture's square shows run everywhere, and no two of them alike: packets fall apart. But a
-//! thousand of them still visit the same few hundred lines and leaves of the tree, most of these by eight rays and more
+//! Rays that bounce off what a picture's square shows run everywhere, and no two of them alike: packets fall apart. But of
+//! thousands of them, many visit the same lines and leaves of the tree, most of these by eight rays and more
 //! (`docs/incoherent.md`). So here it is not rays that walk: a *list* of rays is at a line of the tree, and is cut into
 //! one for each of its eight exits (ray stream filtering: Wald, Gribble, Boulos & Kensler 2007; with an order of its own for
 //! each octant: Barringer & Akenine-Möller 2014; Fuetterling, Lojewski, Pfreundt & Ebert 2015). Lists are always dense:
@@ -9,9 +9,11 @@
 //!
 //! 1. [`Lot`]: up to [`LOT`] rays are made ready, and parted by octant, so that all rays of a list come to the same one of
 //!    two cells first.
-//! 2. [`cut`](cut::cut): the list on top of the stack is cut at a line of the tree, eight rays at a time. The lists that come
-//!    out go on the stack, the nearest exit's on top.
-//! 3. [`leaf`]: in a leaf, each triangle is tested against eight rays of the list at once, as by packets.
+//! 2. [`cut`](cut::cut): the list on top of the stack is cut at a line of the tree, as many rays at a time as a register
+//!    holds. The lists that come out go on the stack, the nearest exit's on top. A list of one ray goes through a line as
+//!    in a stream.
+//! 3. [`leaf`]: in a leaf, triangles are sifted, and those that a ray may hit tested, against as many rays of the list at once.
+//!    Octants take turns, so that what a list needs is fetched while others have theirs.
 //! 4. What rays have found shortens them; rays that nothing is left of drop out of lists as these are cut.
 //!
 //! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
