@@ -72,6 +72,7 @@ mod huge;
 pub mod kdtree;
 pub mod mapped;
 pub mod mesh;
+mod morton;
 pub mod profile;
 pub mod render;
 pub mod scene;

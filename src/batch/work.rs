@@ -63,7 +63,7 @@ impl Tracer<'_> {
     /// Kernels, and how many rays each has traced.
     fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
         let named = self.kernel.map(|kernel| (kernel, self.named));
-        self.learnt.traced().into_iter().chain(named)
+        self.learnt.traced().chain(named)
     }
 }
 

@@ -8,6 +8,7 @@ use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
 use crate::geometry::{Hit, Ray};
+use crate::morton;
 use crate::scene::{Look, Surface, View};
 use crate::simd::{Simd, Task};
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, Place, Places, RayPacket, Stopwatch};
@@ -387,7 +388,8 @@ impl<const W: usize> Scratch<W> {
         let (width, height) = block_size(W);
         let mut used = 0;
         for cell in 0..(side / CELL) * (side / CELL) {
-            let (left, top) = (x + CELL * every_second_bit(cell), y + CELL * every_second_bit(cell >> 1));
+            let (right, down) = morton::place(cell);
+            let (left, top) = (x + CELL * right, y + CELL * down);
             for y in (top..tile.height.min(top + CELL)).step_by(height as usize) {
                 for x in (left..tile.width.min(left + CELL)).step_by(width as usize) {
                     self.active[used] = lanes_inside::<W>(tile, x, y);
@@ -403,11 +405,6 @@ impl<const W: usize> Scratch<W> {
 
 /// Side of the square of pixels that the largest packet covers.
 const CELL: u32 = 4;
-
-/// Bits 0, 2 and 4, moved together.
-const fn every_second_bit(i: u32) -> u32 {
-    i & 1 | i >> 1 & 2 | i >> 2 & 4
-}
 
 /// How many lanes are set.
 fn count(lanes: &[u32]) -> u64 {

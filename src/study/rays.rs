@@ -7,6 +7,7 @@
 use crate::error::{Error, Result};
 use crate::geometry::{Aabb, Hit, Ray};
 use crate::mesh::Mesh;
+use crate::morton;
 use crate::render::offset_point;
 use crate::scene::Camera;
 use glam::Vec3;
@@ -186,18 +187,14 @@ fn camera_rays(camera: &Camera, size: u32) -> Vec<Ray> {
     for block in 0..blocks * blocks {
         let (left, top) = (block % blocks * BLOCK, block / blocks * BLOCK);
         for i in 0..BLOCK * BLOCK {
-            let (x, y) = (left + every_second_bit(i), top + every_second_bit(i >> 1));
+            let (right, down) = morton::place(i);
+            let (x, y) = (left + right, top + down);
             if x < size && y < size {
                 rays.push(view.ray(x, y, [0.5, 0.5]));
             }
         }
     }
     rays
-}
-
-/// Bits 0, 2, 4, 6 and 8, moved together.
-const fn every_second_bit(i: u32) -> u32 {
-    i & 1 | i >> 1 & 2 | i >> 2 & 4 | i >> 3 & 8 | i >> 4 & 16
 }
 
 /// A direction about `normal`, as likely as its cosine (Malley: a point of the disc, lifted).

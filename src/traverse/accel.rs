@@ -1,7 +1,7 @@
 //! A mesh made ready for tracing, and the calls that trace.
 
 use super::lanes::{HitPacket, RayPacket};
-use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query};
+use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query, ResidentInMode, ResidentQuery};
 use super::records::Resident;
 use super::sieve::{Sieve, Sifted};
 use super::tile::{PACKETS, TileCounts, WIDE};
@@ -174,6 +174,22 @@ impl Accel {
             }
             Accuracy::Watertight => self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles)),
             Accuracy::Exact => self.chosen.run(InMode::<_, Exact, _>::new(query, &triangles)),
+        }
+    }
+
+    /// Has a kernel called that knows no other scene than one that is all in memory. Panics if it is not.
+    pub(super) fn ask_all_in_memory<Q: ResidentQuery>(&self, query: Q) {
+        let tree = self.tree();
+        let triangles = Resident { tree, records: tree.triangles() };
+        match self.accuracy {
+            Accuracy::Fast => {
+                let tree = Resident { tree, records: &self.projected };
+                self.chosen.run(ResidentInMode::<Q, Fast> { query, tree });
+            }
+            Accuracy::Watertight => {
+                self.chosen.run(ResidentInMode::<Q, Watertight> { query, tree: triangles });
+            }
+            Accuracy::Exact => self.chosen.run(ResidentInMode::<Q, Exact> { query, tree: triangles }),
         }
     }
 

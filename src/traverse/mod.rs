@@ -21,6 +21,7 @@ mod many;
 mod packet;
 mod query;
 mod range;
+mod ready;
 mod records;
 mod sieve;
 mod stack;

@@ -2,7 +2,7 @@
 
 use super::lanes::{HitPacket, RayPacket};
 use super::packet;
-use super::records::Records;
+use super::records::{Records, Resident};
 use super::tile::{self, PACKETS, TileCounts};
 use super::width::PacketWidth;
 use crate::geometry::triangle::Mode;
@@ -37,6 +37,27 @@ impl<Q: Query, M: Mode, T: Records<M>> Task for InMode<'_, Q, M, T> {
     #[inline(always)]
     fn run<S: Simd>(self) -> Q::Output {
         self.query.run::<S, M, T>(self.tree)
+    }
+}
+
+/// A call of a kernel that knows no scene but one that is all in memory.
+pub trait ResidentQuery {
+    /// Calls the kernel. Always inlined.
+    fn run<S: Simd, M: Mode>(self, tree: &Resident<'_, M::Record>);
+}
+
+/// Such a query in a mode, to be run on an instruction set.
+pub struct ResidentInMode<'a, Q, M: Mode> {
+    pub query: Q,
+    pub tree: Resident<'a, M::Record>,
+}
+
+impl<Q: ResidentQuery, M: Mode> Task for ResidentInMode<'_, Q, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        self.query.run::<S, M>(&self.tree);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::scene::effects::Effect;
 use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch};
 
 /// Rays that go to a kernel at once: as many as a wide beam holds.
-const LOT: usize = 1024;
+const LOT: usize = Kernel::WideTile.width();
 
 /// Traces a worker's rays, and learns which kernel is quickest for which kind of them.
 #[derive(Debug, Default)]

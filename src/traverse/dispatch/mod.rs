@@ -14,12 +14,10 @@
 mod choice;
 mod places;
 mod pool;
-mod scattered;
 mod slices;
 
 pub use pool::DispatchPool;
-pub use scattered::ScatteredDispatch;
-pub use slices::SliceDispatch;
+pub use slices::{ScatteredDispatch, SliceDispatch};
 
 /// What squares of a picture have cost, for [`Dispatch`].
 pub type Places = places::Places<{ WAYS.len() }>;
@@ -99,23 +97,8 @@ impl Dispatch {
         active: &[u32],
         hits: &mut [HitPacket<16>],
     ) {
-        let mut places = places.iter();
-        let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(hits.chunks_mut(PACKETS));
-        for ((rays, active), hits) in squares {
-            let place = places.next().copied().unwrap_or(Place::NONE);
-            Self::square(choice, accel, place, rays, active, hits);
-        }
-    }
-
-    fn square(
-        choice: &mut Choice<{ WAYS.len() }>,
-        accel: &Accel,
-        place: Place<'_>,
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        hits: &mut [HitPacket<16>],
-    ) {
-        timed(accel, &WAYS, choice, place.closest, count(active), |kernel| match kernel {
+        let places = places.iter().map(|place| place.closest);
+        by_squares(choice, accel, places, rays, active, hits, |kernel, rays, active, hits| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
             _ => accel.intersect_packets(rays, active, hits),
@@ -151,29 +134,49 @@ impl Dispatch {
         active: &[u32],
         occluded: &mut [u32],
     ) {
-        let mut places = places.iter();
-        let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(occluded.chunks_mut(PACKETS));
-        for ((rays, active), occluded) in squares {
-            let place = places.next().copied().unwrap_or(Place::NONE);
-            timed(accel, &WAYS, choice, place.any, count(active), |kernel| match kernel {
-                Kernel::Tile => accel.occluded_tile(rays, active, occluded),
-                Kernel::Packet8 => accel.occluded_halves(rays, active, occluded),
-                _ => accel.occluded_packets(rays, active, occluded),
-            });
-        }
+        let places = places.iter().map(|place| place.any);
+        by_squares(
+            choice,
+            accel,
+            places,
+            rays,
+            active,
+            occluded,
+            |kernel, rays, active, found| match kernel {
+                Kernel::Tile => accel.occluded_tile(rays, active, found),
+                Kernel::Packet8 => accel.occluded_halves(rays, active, found),
+                _ => accel.occluded_packets(rays, active, found),
+            },
+        );
     }
 
     /// The kernels that are thought to be quickest at the moment: for closest hits, and for any hit.
     pub fn quickest(&self) -> [Kernel; 2] {
-        let closest = match LOT_WAYS[self.lots.quickest()] {
-            Kernel::WideTile if !self.lots.is_beginning() => Kernel::WideTile,
-            _ => WAYS[self.closest.quickest()],
+        let (closest, any) = (WAYS[self.closest.quickest()], WAYS[self.any.quickest()]);
+        let of_lots = |kernel, lots: &Choice<2>, ways: [Kernel; 2]| {
+            if lots.is_beginning() || ways[lots.quickest()] == Kernel::Tile { kernel } else { ways[0] }
         };
-        let any = match ANY_LOT_WAYS[self.any_lots.quickest()] {
-            Kernel::Filter if !self.any_lots.is_beginning() => Kernel::Filter,
-            _ => WAYS[self.any.quickest()],
-        };
-        [closest, any]
+        [
+            if closest == Kernel::Tile { of_lots(closest, &self.lots, LOT_WAYS) } else { closest },
+            if any == Kernel::Tile { any } else { of_lots(any, &self.any_lots, ANY_LOT_WAYS) },
+        ]
+    }
+}
+
+/// Has packets traced square by square, each by the kernel that is quickest at its place; `trace` writes a square's answers.
+#[inline(always)]
+fn by_squares<'a, A>(
+    choice: &mut Choice<{ WAYS.len() }>,
+    accel: &Accel,
+    places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>>,
+    rays: &[RayPacket<16>],
+    active: &[u32],
+    answers: &mut [A],
+    trace: impl Fn(Kernel, &[RayPacket<16>], &[u32], &mut [A]),
+) {
+    let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
+    for (((rays, active), answers), place) in squares.zip(places.chain(std::iter::repeat(None))) {
+        timed(accel, &WAYS, choice, place, count(active), |kernel| trace(kernel, rays, active, answers));
     }
 }
 
@@ -192,15 +195,12 @@ fn timed<const N: usize>(
     place: Option<&Costs<N>>,
     rays: usize,
     trace: impl FnOnce(Kernel),
-) -> usize {
+) {
     if accel.cached().is_some_and(|cached| cached.is_short()) {
-        trace(ways[FRUGAL]);
-        return FRUGAL;
+        return trace(ways[FRUGAL]);
     }
     if rays < LEAST_RAYS {
-        let way = choice.quickest();
-        trace(ways[way]);
-        return way;
+        return trace(ways[choice.quickest()]);
     }
     let way = match place {
         Some(costs) => choice.next_at(&costs.known()),
@@ -210,7 +210,6 @@ fn timed<const N: usize>(
     if let (Some(costs), Some(cost)) = (place, cost) {
         costs.record(way, cost);
     }
-    way
 }
 
 /// Has a way trace so many rays, and takes note of how long that took.

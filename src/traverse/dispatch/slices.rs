@@ -1,21 +1,26 @@
 //! The kernel that is quickest for rays in a row, whatever they have in common.
 //!
 //! Who hands over a slice of rays may not know whether neighbours go the same way, and a file of rays may hold
-//! both kinds. So streams are tried beside beams and packets, lot by lot: where rays have nothing in common they
-//! are quickest, and where they have they are several times slower.
+//! both kinds. So lists and streams are tried beside beams and packets, lot by lot: where rays have nothing in common they
+//! are quickest, and where they have they are several times slower. Of rays that are known to have little in common
+//! ([`ScatteredDispatch`]), fewer kernels are tried: none of them loses much, and what it takes to find out is soon paid for.
 
 use super::{Accel, Choice, FRUGAL, Kernel, LEAST_RAYS, recorded};
 use crate::geometry::{Hit, Ray};
 
-/// The kernels that it chooses among for closest hits. All but the last are those for any hit.
-const WAYS: [Kernel; 6] =
-    [Kernel::Tile, Kernel::Packet16, Kernel::Packet8, Kernel::Stream, Kernel::Filter, Kernel::WideTile];
-const ANY_WAYS: [Kernel; 5] = [WAYS[0], WAYS[1], WAYS[2], WAYS[3], WAYS[4]];
-
 /// Rays that go to a kernel at once: as many as lists hold. While another kernel than the quickest is tried, as many as a
 /// wide beam does; but lists are tried with as many as they hold, since they are the better, the more there are.
-const LOT: usize = 4096;
-const TRIAL: usize = 1024;
+const LOT: usize = Kernel::Filter.width();
+const TRIAL: usize = Kernel::WideTile.width();
+
+/// Kernels that are chosen among, and what was learnt about them. The second is what is used where memory is short.
+#[derive(Clone, Copy, Debug)]
+struct Slices<const N: usize> {
+    ways: [Kernel; N],
+    choice: Choice<N>,
+    /// How many rays each has traced.
+    traced: [u64; N],
+}
 
 /// What the next of some rays do.
 struct Next {
@@ -26,78 +31,110 @@ struct Next {
     counts: bool,
 }
 
-impl Next {
-    fn choose<const N: usize>(
-        accel: &Accel,
-        ways: &[Kernel; N],
-        choice: &mut Choice<N>,
-        rays: usize,
-    ) -> Self {
-        if accel.cached().is_some_and(|cached| cached.is_short()) {
-            return Self { way: FRUGAL, rays: rays.min(LOT), counts: false };
-        }
-        let quickest = choice.quickest();
-        if rays < LEAST_RAYS {
-            return Self { way: quickest, rays, counts: false };
-        }
-        let way = choice.next();
-        let whole = way == quickest || ways[way] == Kernel::Filter;
-        Self { way, rays: rays.min(if whole { LOT } else { TRIAL }), counts: true }
+impl<const N: usize> Slices<N> {
+    fn among(ways: [Kernel; N]) -> Self {
+        Self { ways, choice: Choice::default(), traced: [0; N] }
     }
 
-    /// Has them traced.
-    fn trace<const N: usize>(&self, accel: &Accel, choice: &mut Choice<N>, trace: impl FnOnce()) {
-        if self.counts {
-            recorded(accel, choice, self.way, self.rays, trace);
-        } else {
-            trace();
+    /// Has rays traced lot by lot; `trace` writes a lot's answers.
+    fn trace<A>(
+        &mut self,
+        accel: &Accel,
+        mut rays: &[Ray],
+        mut answers: &mut [A],
+        trace: impl Fn(Kernel, &[Ray], &mut [A]),
+    ) {
+        assert_eq!(rays.len(), answers.len(), "as many answers as rays");
+        while !rays.is_empty() {
+            let next = self.next(accel, rays.len());
+            let (now, later) = rays.split_at(next.rays);
+            let (answers_now, answers_later) = answers.split_at_mut(next.rays);
+            let kernel = self.ways[next.way];
+            if next.counts {
+                let choice = &mut self.choice;
+                recorded(accel, choice, next.way, next.rays, || trace(kernel, now, answers_now));
+            } else {
+                trace(kernel, now, answers_now);
+            }
+            self.traced[next.way] += next.rays as u64;
+            (rays, answers) = (later, answers_later);
         }
+    }
+
+    fn next(&mut self, accel: &Accel, rays: usize) -> Next {
+        if accel.cached().is_some_and(|cached| cached.is_short()) {
+            return Next { way: FRUGAL, rays: rays.min(LOT), counts: false };
+        }
+        let quickest = self.choice.quickest();
+        if rays < LEAST_RAYS {
+            return Next { way: quickest, rays, counts: false };
+        }
+        let way = self.choice.next();
+        let whole = way == quickest || self.ways[way] == Kernel::Filter;
+        Next { way, rays: rays.min(if whole { LOT } else { TRIAL }), counts: true }
     }
 }
 
 /// What one worker has learnt about which kernel is quickest for rays in slices: for closest hits, and for any
 /// hit. One for each thread and, where several kinds of rays are told apart, for each kind.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct SliceDispatch {
-    closest: Choice<{ WAYS.len() }>,
-    any: Choice<{ ANY_WAYS.len() }>,
-    traced: [u64; WAYS.len()],
+    closest: Slices<6>,
+    any: Slices<5>,
+}
+
+impl Default for SliceDispatch {
+    fn default() -> Self {
+        use Kernel::{Filter, Packet8, Packet16, Stream, Tile, WideTile};
+        Self {
+            closest: Slices::among([Tile, Packet16, Packet8, Stream, Filter, WideTile]),
+            any: Slices::among([Tile, Packet16, Packet8, Stream, Filter]),
+        }
+    }
 }
 
 impl SliceDispatch {
     /// As [`Accel::intersect_many`], by the kernel that is quickest.
     pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
-        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
-        let (mut rays, mut hits) = (rays, hits);
-        while !rays.is_empty() {
-            let next = Next::choose(accel, &WAYS, &mut self.closest, rays.len());
-            let (now, later) = rays.split_at(next.rays);
-            let (hits_now, hits_later) = hits.split_at_mut(next.rays);
-            let kernel = WAYS[next.way];
-            next.trace(accel, &mut self.closest, || accel.intersect_many(kernel, now, hits_now));
-            self.traced[next.way] += next.rays as u64;
-            (rays, hits) = (later, hits_later);
-        }
+        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits));
     }
 
     /// As [`Accel::occluded_many`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
-        assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
-        let (mut rays, mut occluded) = (rays, occluded);
-        while !rays.is_empty() {
-            let next = Next::choose(accel, &ANY_WAYS, &mut self.any, rays.len());
-            let (now, later) = rays.split_at(next.rays);
-            let (found_now, found_later) = occluded.split_at_mut(next.rays);
-            let kernel = ANY_WAYS[next.way];
-            next.trace(accel, &mut self.any, || accel.occluded_many(kernel, now, found_now));
-            self.traced[next.way] += next.rays as u64;
-            (rays, occluded) = (later, found_later);
-        }
+        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found));
     }
 
-    /// How many rays each kernel has traced.
-    pub fn traced(&self) -> [(Kernel, u64); WAYS.len()] {
-        std::array::from_fn(|way| (WAYS[way], self.traced[way]))
+    /// Kernels, and how many rays each has traced. One may be there twice: for closest hits, and for any hit.
+    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
+        let Self { closest, any } = *self;
+        closest.ways.into_iter().zip(closest.traced).chain(any.ways.into_iter().zip(any.traced))
+    }
+}
+
+/// What one worker has learnt about which kernel is quickest for rays of one kind that bounce off something: for closest
+/// hits, and for any hit.
+#[derive(Clone, Copy, Debug)]
+pub struct ScatteredDispatch {
+    closest: Slices<2>,
+    any: Slices<3>,
+}
+
+impl Default for ScatteredDispatch {
+    fn default() -> Self {
+        use Kernel::{Filter, Packet16, Stream};
+        Self { closest: Slices::among([Filter, Stream]), any: Slices::among([Filter, Stream, Packet16]) }
+    }
+}
+
+impl ScatteredDispatch {
+    /// As [`Accel::intersect_many`], by the kernel that is quickest.
+    pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
+        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits));
+    }
+
+    /// As [`Accel::occluded_many`], by the kernel that is quickest.
+    pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
+        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found));
     }
 }
 
@@ -108,27 +145,55 @@ mod tests {
     use crate::mesh::generate::shapes;
     use glam::Vec3;
 
-    #[test]
-    fn every_ray_is_answered_as_by_itself_and_counted() {
-        let accel = Accel::build(&shapes::soup(200, 1), &BuildParams::default()).expect("a soup has a tree");
-        let rays: Vec<Ray> = (0..120 * TRIAL + 5)
-            .map(|i| {
-                let part = |k: f32| (i as f32 * k).fract();
-                let origin = Vec3::new(part(0.618), part(0.755), part(0.57)) * 2.0 - 0.5;
-                Ray::new(origin, Vec3::new(part(0.31) - 0.5, part(0.87) - 0.5, part(0.13) - 0.5))
-            })
-            .collect();
-        let mut dispatch = SliceDispatch::default();
-        let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        dispatch.intersect(&accel, &rays, &mut hits);
-        dispatch.occluded(&accel, &rays, &mut occluded);
-        for ((ray, hit), occluded) in rays.iter().zip(&hits).zip(&occluded) {
+    fn soup() -> Accel {
+        Accel::build(&shapes::soup(200, 1), &BuildParams::default()).expect("a soup has a tree")
+    }
+
+    fn rays(first: usize, count: usize) -> Vec<Ray> {
+        let ray = |i: usize| {
+            let part = |k: f32| (i as f32 * k).fract();
+            let origin = Vec3::new(part(0.618), part(0.755), part(0.57)) * 2.0 - 0.5;
+            Ray::new(origin, Vec3::new(part(0.31) - 0.5, part(0.87) - 0.5, part(0.13) - 0.5))
+        };
+        (first..first + count).map(ray).collect()
+    }
+
+    /// Every ray is answered as by itself; some hit, and some do not.
+    fn check(accel: &Accel, rays: &[Ray], hits: &[Hit], occluded: &[bool]) {
+        for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
             assert_eq!(*hit, accel.intersect(ray));
             assert_eq!(*occluded, hit.is_hit());
         }
         assert!(hits.iter().any(Hit::is_hit) && !hits.iter().all(Hit::is_hit));
-        let traced = dispatch.traced();
+    }
+
+    #[test]
+    fn every_ray_is_answered_as_by_itself_and_counted() {
+        let accel = soup();
+        let rays = rays(0, 120 * TRIAL + 5);
+        let mut dispatch = SliceDispatch::default();
+        let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+        dispatch.intersect(&accel, &rays, &mut hits);
+        dispatch.occluded(&accel, &rays, &mut occluded);
+        check(&accel, &rays, &hits, &occluded);
+        let traced: Vec<(Kernel, u64)> = dispatch.traced().collect();
         assert_eq!(traced.iter().map(|(_, rays)| rays).sum::<u64>(), 2 * rays.len() as u64);
         assert!(traced.iter().all(|&(_, rays)| rays > 0), "all ways are tried: {traced:?}");
+    }
+
+    #[test]
+    fn scattered_rays_are_answered_as_by_themselves_whichever_kernel_they_go_to() {
+        let accel = soup();
+        let mut dispatch = ScatteredDispatch::default();
+        for lot in 0..20 {
+            let rays = rays(lot * 701, 200 + 17 * lot);
+            let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            dispatch.intersect(&accel, &rays, &mut hits);
+            dispatch.occluded(&accel, &rays, &mut occluded);
+            check(&accel, &rays, &hits, &occluded);
+        }
+        let Slices { traced: closest, .. } = dispatch.closest;
+        let Slices { traced: any, .. } = dispatch.any;
+        assert!(closest.iter().chain(&any).all(|&rays| rays > 0), "all ways are tried: {closest:?} {any:?}");
     }
 }

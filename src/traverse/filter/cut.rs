@@ -9,7 +9,7 @@ use super::lists::{Entries, Heads, List, SLACK};
 use super::lot::{Crossing, Lot};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Mask};
-use crate::traverse::stream::step::take;
+use crate::traverse::stream::step::{ORDERS, take};
 
 /// A line as rays see it that run into an octant: in the order in which they come to its exits, the farthest first.
 ///
@@ -31,8 +31,9 @@ impl Seen {
         // Where rays run down, by place.
         let signs = &SIGNS[octant & 7];
         let down = L::of_fours([signs; 2]).pick_in_fours(exits).lt(L::splat(0.0)).bits() & 0xff;
-        let order = &ORDERS[down as usize];
-        let (planes, ordered) = (L::ids_widen(&order.planes), L::ids_pick(exits, L::ids_widen(&order.exits)));
+        let planes = L::ids_widen(&PLANES[down as usize]);
+        // The lanes of a stream's exits are in the order that is wanted here.
+        let ordered = L::ids_pick(exits, L::ids_widen(&ORDERS[down as usize]));
         // An exit that leads nowhere has nothing but an axis in it.
         let leads = L::ids_less(L::ids(3), ordered) | L::ids_less(ordered, L::ids(0));
         Self {
@@ -61,41 +62,27 @@ static SIGNS: [[f32; 4]; 8] = {
     signs
 };
 
-/// Places in the order of [`Seen`].
-#[derive(Clone, Copy)]
-struct Order {
-    planes: [u16; 8],
-    exits: [u16; 8],
-}
-
-/// By the set of places whose planes rays cross downward.
-static ORDERS: [Order; 256] = {
-    let mut orders = [Order { planes: [0; 8], exits: [0; 8] }; 256];
+/// Places of planes in the order of [`Seen`], by the set of places whose planes rays cross downward.
+static PLANES: [[u16; 8]; 256] = {
+    let mut planes = [[0; 8]; 256];
     let mut down = 0;
     while down < 256 {
-        // 0 is far, 1 is near: the half, quarter or exit above a plane if rays run up, or down.
+        // 0 is the far half or quarter, that above its plane if rays run up through it; 1 the near one.
         let mut half = 0;
         while half < 2 {
             let first = 4 * (down & 1 ^ 1 ^ half);
-            orders[down].planes[1 + 3 * half] = (first + 1) as u16;
+            planes[down][1 + 3 * half] = (first + 1) as u16;
             let mut quarter = 0;
             while quarter < 2 {
                 let second = down >> (first + 1) & 1 ^ 1 ^ quarter;
-                let place = first + 2 + second;
-                orders[down].planes[2 + 3 * half + quarter] = place as u16;
-                let mut exit = 0;
-                while exit < 2 {
-                    let third = down >> place & 1 ^ 1 ^ exit;
-                    orders[down].exits[4 * half + 2 * quarter + exit] = (first + 2 * second + third) as u16;
-                    exit += 1;
-                }
+                planes[down][2 + 3 * half + quarter] = (first + 2 + second) as u16;
                 quarter += 1;
             }
             half += 1;
         }
         down += 1;
     }
-    orders
+    planes
 };
 
 /// Cuts a list at a line, and puts what comes out on the stack, the nearest on top.

@@ -1,17 +1,17 @@
 //! A lot of rays: where each starts, how it runs, and what it has found.
 
-use crate::geometry::triangle::{Mode, Test};
 use crate::geometry::{Aabb, Ray};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Lanes, Mask};
 use crate::traverse::closest::{Closest, NONE};
+use crate::traverse::kernel::Kernel;
 use crate::traverse::lanes::RayPacket;
-use crate::traverse::range::{LEAST, LIMIT};
+use crate::traverse::ready::Ready;
 use crate::traverse::stream::step::Planes;
-use crate::traverse::walk::{FLATTEST, MARGIN, load3};
+use crate::traverse::walk::{MARGIN, load3};
 
 /// Rays in a lot.
-pub const LOT: usize = 4096;
+pub const LOT: usize = Kernel::Filter.width();
 
 /// A ray on its way, in half a cache line.
 #[derive(Clone, Copy)]
@@ -95,42 +95,21 @@ impl Lot {
     fn prepare_eight<L: Eight>(&mut self, rays: &[Ray], eight: usize, bounds: &Aabb) -> L {
         let packet = RayPacket::<8>::of_slice(rays);
         let present = (1u32 << rays.len().min(8)) - 1;
-        let zero = L::splat(0.0);
         let (origin, direction) = (load3::<8, L>(&packet.origin), load3::<8, L>(&packet.direction));
-        let longest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
         let (tnear, tfar) = (L::load(&packet.tnear), L::load(&packet.tfar));
-
-        // As in `walk.rs`. What is compared with a NaN is odd.
-        let mut ordinary = L::splat(LEAST).le(longest) & tnear.le(tfar);
-        let mut reach = zero;
-        let mut inverse = [zero; 3];
-        let flattest = longest * L::splat(FLATTEST);
-        for axis in 0..3 {
-            let speed = direction[axis].abs();
-            ordinary = ordinary & speed.lt(L::splat(LIMIT)) & origin[axis].abs().le(L::splat(f32::MAX));
-            inverse[axis] = L::splat(1.0) / flattest.max(speed).copysign(direction[axis]);
-            let to_low = (L::splat(bounds.min[axis]) - origin[axis]).abs();
-            let to_high = (L::splat(bounds.max[axis]) - origin[axis]).abs();
-            reach = to_low.max(to_high).max(reach);
-        }
-        let thickness = reach * L::splat(MARGIN);
-        let (mut tmin, mut tmax) = (tnear, L::splat(f32::MAX).min(tfar));
-        let mut down = [0; 3];
-        for axis in 0..3 {
-            let margin = thickness * inverse[axis].abs();
-            let low = (L::splat(bounds.min[axis]) - origin[axis]) * inverse[axis];
-            let high = (L::splat(bounds.max[axis]) - origin[axis]) * inverse[axis];
-            tmin = (low.min(high) - margin).max(tmin);
-            tmax = (low.max(high) + margin).min(tmax);
-            down[axis] = inverse[axis].lt(zero).bits();
-        }
-        let flies = ordinary & tmin.le(tmax);
-        self.odd[eight] = (!ordinary.bits() & present) as u8;
+        let Ready { inverse, reach, tmin, tmax, closest, ordinary, flies, .. } =
+            Ready::new(&origin, &direction, tnear, tfar, bounds);
+        self.odd[eight] = (!ordinary & present) as u8;
         let place = 8 * eight;
         *self.tmin[place..].first_chunk_mut().expect("eights fill the lot") = tmin.store();
         *self.tmax[place..].first_chunk_mut().expect("eights fill the lot") = tmax.store();
 
-        let closest = L::splat(f32::MAX).min(tfar).store();
+        let zero = L::splat(0.0);
+        let mut down = [0; 3];
+        for axis in 0..3 {
+            down[axis] = inverse[axis].lt(zero).bits();
+        }
+        let closest = closest.store();
         let inverse = [inverse[0].store(), inverse[1].store(), inverse[2].store()];
         for (lane, ray) in rays.iter().enumerate().take(8) {
             self.travellers[place + lane] = Traveller {
@@ -143,7 +122,7 @@ impl Lot {
         for traveller in &mut self.travellers[place + rays.len()..place + 8] {
             traveller.inverse[3] = f32::from_bits(NONE as u32);
         }
-        let mut left = flies.bits() & present;
+        let mut left = flies & present;
         while left != 0 {
             let lane = left.trailing_zeros() as usize & 7;
             left &= left - 1;
@@ -153,7 +132,7 @@ impl Lot {
             self.octants[octant][*count % LOT] = (place + lane) as i32;
             *count += 1;
         }
-        L::select(flies, reach, zero)
+        L::select(L::mask_from_bits(flies), reach, zero)
     }
 
     /// The rays that run into an octant.
@@ -244,10 +223,4 @@ impl Lot {
     pub fn odd(&self, eight: usize) -> u32 {
         u32::from(self.odd[eight])
     }
-}
-
-/// The test of eight rays, made ready.
-#[inline(always)]
-pub fn test_of<L: Eight, M: Mode>(rays: &RayPacket<8>, active: u32) -> M::Test<8, L> {
-    M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), active)
 }

@@ -28,75 +28,52 @@ mod lot;
 
 use super::closest::Closest;
 use super::lanes::RayPacket;
-use super::packet;
 use super::records::Resident;
-use crate::geometry::triangle::Mode;
-use crate::geometry::{Hit, Ray};
+use super::stream::{self, Answers};
+use super::walk::load3;
+use crate::geometry::Ray;
+use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::{Exit, Tree};
 use crate::simd::{Eight, Simd};
 use lists::{Entries, Heads};
-use lot::Lot;
+use lot::{LOT, Lot};
 use std::cell::Cell;
 
-pub use lot::LOT;
-
-/// What is asked of each ray.
-pub trait Answers {
-    /// Whether any hit will do.
-    const ANY: bool;
-
+/// What is asked of each ray, eight answers at a time.
+pub trait ByEights: Answers {
     /// What up to eight rays from number `first` on have found.
-    fn found<L: Eight, M: Mode>(
+    fn found_by_eight<L: Eight, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
         rays: &RayPacket<8>,
         first: usize,
         closest: &Closest<8, L>,
     );
-
-    /// A ray that the packet kernel has to trace.
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>);
 }
 
-/// Records of closest hits.
-pub struct Nearest<'a>(pub &'a mut [Hit]);
-
-impl Answers for Nearest<'_> {
-    const ANY: bool = false;
-
+impl ByEights for stream::Closest<'_> {
     #[inline(always)]
-    fn found<L: Eight, M: Mode>(
+    fn found_by_eight<L: Eight, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
         rays: &RayPacket<8>,
         first: usize,
         closest: &Closest<8, L>,
     ) {
-        let test = lot::test_of::<L, M>(rays, closest.found());
+        let test = M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), closest.found());
         let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test));
         for (lane, hit) in self.0[first..].iter_mut().take(8).enumerate() {
             *hit = found.get(lane);
         }
     }
-
-    #[cold]
-    #[inline(never)]
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>) {
-        self.0[ray] = packet::intersect::<1, f32, _, M>(tree, rays, 1).get(0);
-    }
 }
 
-/// Whether rays hit anything.
-pub struct Any<'a>(pub &'a mut [bool]);
-
-impl Answers for Any<'_> {
-    const ANY: bool = true;
-
+impl ByEights for stream::Any<'_> {
     #[inline(always)]
-    fn found<L: Eight, M: Mode>(
+    fn found_by_eight<L: Eight, M: Mode>(
         &mut self,
-        _tree: &Resident<'_, M::Record>,
-        _rays: &RayPacket<8>,
+        _: &Resident<'_, M::Record>,
+        _: &RayPacket<8>,
         first: usize,
         closest: &Closest<8, L>,
     ) {
@@ -104,12 +81,6 @@ impl Answers for Any<'_> {
         for (lane, occluded) in self.0[first..].iter_mut().take(8).enumerate() {
             *occluded = found >> lane & 1 == 1;
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &RayPacket<1>) {
-        self.0[ray] = packet::occluded::<1, f32, _, M>(tree, rays, 1) == 1;
     }
 }
 
@@ -127,7 +98,7 @@ thread_local! {
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
-pub fn trace<S: Simd, M: Mode, A: Answers>(
+pub fn trace<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
@@ -141,20 +112,18 @@ pub fn trace<S: Simd, M: Mode, A: Answers>(
     };
     let room = &mut *boxed;
     let is_scaled = !resident.scale().is_none();
-    let mut first = 0;
-    for rays in rays.chunks(LOT) {
+    for (i, lot) in rays.chunks(LOT).enumerate() {
         if is_scaled {
-            room.lot.leave(rays.len());
+            room.lot.leave(lot.len());
         } else {
-            room.lot.prepare::<S::F8>(rays, resident.bounds());
+            room.lot.prepare::<S::F8>(lot, resident.bounds());
             if A::ANY {
                 walk::<S, M, true>(resident, room);
             } else {
                 walk::<S, M, false>(resident, room);
             }
         }
-        give::<S, M, A>(resident, rays, first, &room.lot, answers);
-        first += rays.len();
+        give::<S, M, A>(resident, rays, i * LOT, &room.lot, answers);
     }
     ROOM.set(Some(boxed));
 }
@@ -214,24 +183,23 @@ fn walk<S: Simd, M: Mode, const ANY: bool>(resident: &Resident<'_, M::Record>, r
     }
 }
 
-/// Gives the answers of a lot's rays, of which the first has the number `first`.
+/// Gives the answers of a lot's rays, those of `rays` from number `first` on.
 #[inline(always)]
-fn give<S: Simd, M: Mode, A: Answers>(
+fn give<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     first: usize,
     lot: &Lot,
     answers: &mut A,
 ) {
-    for (eight, rays) in rays.chunks(8).enumerate() {
-        let packet = RayPacket::<8>::of_slice(rays);
-        answers.found::<S::F8, M>(resident, &packet, first + 8 * eight, &lot.closest::<S::F8>(eight));
+    for (eight, of_lot) in rays[first..].chunks(8).take(LOT / 8).enumerate() {
+        let (packet, first) = (RayPacket::<8>::of_slice(of_lot), first + 8 * eight);
+        answers.found_by_eight::<S::F8, M>(resident, &packet, first, &lot.closest::<S::F8>(eight));
         let mut odd = lot.odd(eight);
         while odd != 0 {
             let lane = odd.trailing_zeros() as usize & 7;
             odd &= odd - 1;
-            let ray = RayPacket::of_slice(&[rays[lane]]);
-            answers.odd::<M>(resident, first + 8 * eight + lane, &ray);
+            answers.odd::<M>(resident, first + lane, rays);
         }
     }
 }

@@ -23,9 +23,9 @@ use crate::kdtree::{Exit, Line};
 use crate::simd::{Eight, Mask};
 use crate::traverse::closest::Closest;
 use crate::traverse::packet::test_leaf;
-use crate::traverse::range::{LEAST, LIMIT};
+use crate::traverse::ready::Ready;
 use crate::traverse::records::Resident;
-use crate::traverse::walk::{FLATTEST, MARGIN, load3};
+use crate::traverse::walk::load3;
 
 /// Lines that eight rays can go through together.
 const CHAIN: usize = crate::kdtree::MAX_DEPTH.div_ceil(3);
@@ -100,47 +100,22 @@ impl Group {
             self.closest[lane] = ray.tfar;
         }
         let present = (1u32 << rays.len().min(8)) - 1;
-        let zero = L::splat(0.0);
         let (origin, direction) = (load3::<8, L>(&self.origin), load3::<8, L>(&self.direction));
-        let longest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
         let (tnear, tfar) = (L::load(&self.tnear), L::load(&self.closest));
-
-        // As in `walk.rs`. What is compared with a NaN is odd.
-        let mut ordinary = L::splat(LEAST).le(longest) & tnear.le(tfar);
-        let mut reach = zero;
-        let mut inverse = [zero; 3];
-        let flattest = longest * L::splat(FLATTEST);
-        for axis in 0..3 {
-            let speed = direction[axis].abs();
-            ordinary = ordinary & speed.lt(L::splat(LIMIT)) & origin[axis].abs().le(L::splat(f32::MAX));
-            inverse[axis] = L::splat(1.0) / flattest.max(speed).copysign(direction[axis]);
-            let to_low = (L::splat(bounds.min[axis]) - origin[axis]).abs();
-            let to_high = (L::splat(bounds.max[axis]) - origin[axis]).abs();
-            reach = to_low.max(to_high).max(reach);
-        }
-        let thickness = reach * L::splat(MARGIN);
-        let (mut tmin, mut tmax) = (tnear, L::splat(f32::MAX).min(tfar));
-        let mut margin = [zero; 3];
-        for axis in 0..3 {
-            margin[axis] = thickness * inverse[axis].abs();
-            let low = (L::splat(bounds.min[axis]) - origin[axis]) * inverse[axis];
-            let high = (L::splat(bounds.max[axis]) - origin[axis]) * inverse[axis];
-            tmin = (low.min(high) - margin[axis]).max(tmin);
-            tmax = (low.max(high) + margin[axis]).min(tmax);
-        }
-        self.odd = !ordinary.bits() & present;
-        self.flies = (ordinary & tmin.le(tmax)).bits() & present;
+        let Ready { inverse, thickness, margin, tmin, tmax, closest, ordinary, flies, .. } =
+            Ready::new(&origin, &direction, tnear, tfar, bounds);
+        self.odd = !ordinary & present;
+        self.flies = flies & present;
         for axis in 0..3 {
             self.inverse[axis] = inverse[axis].store();
             self.margin[axis] = margin[axis].store();
         }
-        (self.tmin, self.tmax) = (tmin.store(), tmax.store());
-        self.closest = L::splat(f32::MAX).min(tfar).store();
+        (self.tmin, self.tmax, self.closest) = (tmin.store(), tmax.store(), closest.store());
         self.primitive = [NONE as i32; 8];
         (self.len, self.exit) = (0, 0);
         self.last = self.tmax;
         // Behind their origins rays may run anywhere.
-        let from_origin = zero.le(tnear).bits() & self.flies == self.flies;
+        let from_origin = L::splat(0.0).le(tnear).bits() & self.flies == self.flies;
         if self.flies != 0 && from_origin {
             self.descend::<L>(lines, &origin, &inverse, &margin, thickness + thickness, tmin, tmax);
         }

@@ -145,7 +145,7 @@ pub fn take<L: Eight>(line: &Line, seen: &Planes<L>, barred: usize, tmin: L, tma
 /// For each set of places whose planes a ray crosses downward, and for each lane, what is to be fetched:
 /// bits 0 to 2 the exit; 4 to 6 the place in `upper` of the wall of the second level; 8 to 10 that in
 /// `lower` of the third.
-static ORDERS: [[u16; 8]; 256] = {
+pub static ORDERS: [[u16; 8]; 256] = {
     let mut orders = [[0; 8]; 256];
     let mut down = 0;
     while down < 256 {
