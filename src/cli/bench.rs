@@ -41,8 +41,8 @@ pub struct Args {
     /// Engines
     #[arg(long, value_delimiter = ',', default_value = "raypack,embree,obvhs")]
     engines: Vec<String>,
-    /// raypack's modes: single, packet4, packet8, packet16, stream, tile, auto (what render does), mixed (what
-    /// cast does); all of them if none is named
+    /// raypack's modes: single, packet4, packet8, packet16, stream, filter, tile, tile1024, auto (what render
+    /// does), mixed (what cast does); all of them if none is named
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     modes: Vec<String>,
     /// Race with one thread, and with this many; 0 for all processors

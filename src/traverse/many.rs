@@ -70,25 +70,26 @@ impl Accel {
     /// By beams of `K` squares.
     fn intersect_tiles<const K: usize>(&self, rays: &[Ray], hits: &mut [Hit]) {
         let size = K * PACKETS * 16;
+        let mut squares = Squares::<K>::new();
+        let mut found = [const { [const { HitPacket::miss() }; PACKETS] }; K];
+        let found = found.as_flattened_mut();
         for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
-            let (packets, active) = packets_of::<K>(rays);
-            let (packets, active) = (packets.as_flattened(), active.as_flattened());
-            let mut found = [const { [const { HitPacket::miss() }; PACKETS] }; K];
-            let found = found.as_flattened_mut();
-            let count = rays.len().div_ceil(16);
-            self.intersect_tile(&packets[..count], &active[..count], &mut found[..count]);
-            for (i, hit) in hits.iter_mut().enumerate() {
-                *hit = found[i / 16].get(i % 16);
+            let (packets, active) = squares.fill(rays);
+            self.intersect_tile(packets, active, &mut found[..packets.len()]);
+            for (hits, found) in hits.chunks_mut(16).zip(&*found) {
+                for (lane, hit) in hits.iter_mut().enumerate() {
+                    *hit = found.get(lane);
+                }
             }
         }
     }
 
     fn occluded_tiles(&self, rays: &[Ray], occluded: &mut [bool]) {
+        let mut squares = Squares::<1>::new();
+        let mut found = [0; PACKETS];
         for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
-            let ([packets], [active]) = packets_of::<1>(rays);
-            let mut found = [0; PACKETS];
-            let count = rays.len().div_ceil(16);
-            self.occluded_tile(&packets[..count], &active[..count], &mut found[..count]);
+            let (packets, active) = squares.fill(rays);
+            self.occluded_tile(packets, active, &mut found[..packets.len()]);
             for (i, occluded) in occluded.iter_mut().enumerate() {
                 *occluded = found[i / 16] >> (i % 16) & 1 == 1;
             }
@@ -96,14 +97,32 @@ impl Accel {
     }
 }
 
-/// Up to `K` squares' rays as packets, and the lanes that hold one.
-fn packets_of<const K: usize>(rays: &[Ray]) -> ([[RayPacket<16>; PACKETS]; K], [[u32; PACKETS]; K]) {
-    let mut packets = [const { [const { RayPacket::empty() }; PACKETS] }; K];
-    let mut active = [[0; PACKETS]; K];
-    let places = packets.as_flattened_mut().iter_mut().zip(active.as_flattened_mut());
-    for (rays, (packet, active)) in rays.chunks(16).zip(places) {
-        *packet = RayPacket::of_slice(rays);
-        *active = lanes_of(rays.len());
+/// Room for `K` squares' rays as packets. It is filled again and again, since it is too large to be handed around.
+struct Squares<const K: usize> {
+    packets: [[RayPacket<16>; PACKETS]; K],
+    /// The lanes that hold a ray.
+    active: [[u32; PACKETS]; K],
+}
+
+impl<const K: usize> Squares<K> {
+    const fn new() -> Self {
+        Self { packets: [const { [const { RayPacket::empty() }; PACKETS] }; K], active: [[0; PACKETS]; K] }
     }
-    (packets, active)
+
+    /// Takes up as many rays as there is room for at most, and gives the packets that they fill, with their lanes.
+    fn fill(&mut self, rays: &[Ray]) -> (&[RayPacket<16>], &[u32]) {
+        let (packets, active) = (self.packets.as_flattened_mut(), self.active.as_flattened_mut());
+        for ((rays, packet), active) in rays.chunks(16).zip(&mut *packets).zip(&mut *active) {
+            if let Ok(rays) = <&[Ray; 16]>::try_from(rays) {
+                for (lane, ray) in rays.iter().enumerate() {
+                    packet.set(lane, ray);
+                }
+            } else {
+                *packet = RayPacket::of_slice(rays);
+            }
+            *active = lanes_of(rays.len());
+        }
+        let count = rays.len().div_ceil(16);
+        (&packets[..count], &active[..count])
+    }
 }

@@ -43,6 +43,10 @@ const BEAM: usize = 0;
 const LOT_WAYS: [Kernel; 2] = [Kernel::WideTile, Kernel::Tile];
 const ANY_LOT_WAYS: [Kernel; 2] = [Kernel::Filter, Kernel::Tile];
 
+/// The first of each.
+const WIDE: usize = 0;
+const LISTS: usize = 0;
+
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
 /// who uses both needs both in memory. On a power plant of which 16 % were in memory, packets alone read 28 %
 /// fewer blocks and were a fifth faster.
@@ -61,6 +65,8 @@ pub struct Dispatch {
     any_lots: Choice<{ ANY_LOT_WAYS.len() }>,
     closest: Choice<{ WAYS.len() }>,
     any: Choice<{ WAYS.len() }>,
+    /// Logarithm of the least that lists have taken for a ray.
+    least_by_lists: Option<f32>,
 }
 
 impl Dispatch {
@@ -82,10 +88,13 @@ impl Dispatch {
         if !is_lot(accel, closest, rays) || !in_beams {
             return Self::squares(closest, accel, places, rays, active, hits);
         }
-        timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
+        let taken = timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
             Kernel::WideTile => accel.intersect_tile(rays, active, hits),
             _ => Self::squares(closest, accel, places, rays, active, hits),
         });
+        if let Some((WIDE, cost)) = taken {
+            closest.pass(cost);
+        }
     }
 
     /// The same, square by square.
@@ -114,15 +123,21 @@ impl Dispatch {
         active: &[u32],
         occluded: &mut [u32],
     ) {
-        let Self { any_lots, any, .. } = self;
-        // Where beams are quicker than packets, they are quicker than lists.
-        if !is_lot(accel, any, rays) || any.quickest() == BEAM {
+        let Self { any_lots, any, least_by_lists, .. } = self;
+        // Where beams are quicker than packets, they are quicker than lists. And rays that run through little are not
+        // worth a list's trouble, which costs something even where they meet nothing.
+        let is_cheap = any_lots.quickest() != LISTS && least_by_lists.is_some_and(|least| any.last() < least);
+        if !is_lot(accel, any, rays) || any.quickest() == BEAM || is_cheap {
             return Self::occluded_squares(any, accel, places, rays, active, occluded);
         }
-        timed(accel, &ANY_LOT_WAYS, any_lots, None, count(active), |kernel| match kernel {
+        let taken = timed(accel, &ANY_LOT_WAYS, any_lots, None, count(active), |kernel| match kernel {
             Kernel::Filter => accel.occluded_lists(rays, active, occluded),
             _ => Self::occluded_squares(any, accel, places, rays, active, occluded),
         });
+        if let Some((LISTS, cost)) = taken {
+            any.pass(cost);
+            *least_by_lists = Some(least_by_lists.map_or(cost, |least| least.min(cost)));
+        }
     }
 
     /// The same, square by square.
@@ -186,7 +201,8 @@ fn is_lot(accel: &Accel, squares: &Choice<{ WAYS.len() }>, rays: &[RayPacket<16>
     rays.len() > PACKETS && accel.cached().is_none() && !squares.is_beginning()
 }
 
-/// Has a kernel trace so many rays of a place, and takes note of how long that took.
+/// Has a kernel trace so many rays of a place, and takes note of how long that took. Gives the way, and the logarithm of the
+/// nanoseconds that a ray took, if note was taken.
 #[inline(always)]
 fn timed<const N: usize>(
     accel: &Accel,
@@ -195,21 +211,24 @@ fn timed<const N: usize>(
     place: Option<&Costs<N>>,
     rays: usize,
     trace: impl FnOnce(Kernel),
-) {
+) -> Option<(usize, f32)> {
     if accel.cached().is_some_and(|cached| cached.is_short()) {
-        return trace(ways[FRUGAL]);
+        trace(ways[FRUGAL]);
+        return None;
     }
     if rays < LEAST_RAYS {
-        return trace(ways[choice.quickest()]);
+        trace(ways[choice.quickest()]);
+        return None;
     }
     let way = match place {
         Some(costs) => choice.next_at(&costs.known()),
         None => choice.next(),
     };
-    let cost = recorded(accel, choice, way, rays, || trace(ways[way]));
-    if let (Some(costs), Some(cost)) = (place, cost) {
+    let cost = recorded(accel, choice, way, rays, || trace(ways[way]))?;
+    if let Some(costs) = place {
         costs.record(way, cost);
     }
+    Some((way, cost))
 }
 
 /// Has a way trace so many rays, and takes note of how long that took.

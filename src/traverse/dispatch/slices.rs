@@ -1,17 +1,48 @@
 //! The kernel that is quickest for rays in a row, whatever they have in common.
 //!
 //! Who hands over a slice of rays may not know whether neighbours go the same way, and a file of rays may hold
-//! both kinds. So lists and streams are tried beside beams and packets, lot by lot: where rays have nothing in common they
-//! are quickest, and where they have they are several times slower. Of rays that are known to have little in common
-//! ([`ScatteredDispatch`]), fewer kernels are tried: none of them loses much, and what it takes to find out is soon paid for.
+//! both kinds. Where rays have nothing in common, lists and streams are quickest and beams and packets are several times
+//! slower; where they have, it is the other way round. So it is looked at first, lot by lot, whether rays are
+//! [scattered](are_scattered), and each kind has its own kernels to choose from: none of them loses much, and what it takes
+//! to find out is soon paid for. Whoever knows that rays are scattered has a [`ScatteredDispatch`].
 
 use super::{Accel, Choice, FRUGAL, Kernel, LEAST_RAYS, recorded};
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Aabb, Hit, Ray};
 
 /// Rays that go to a kernel at once: as many as lists hold. While another kernel than the quickest is tried, as many as a
-/// wide beam does; but lists are tried with as many as they hold, since they are the better, the more there are.
+/// wide beam does.
 const LOT: usize = Kernel::Filter.width();
 const TRIAL: usize = Kernel::WideTile.width();
+
+/// How many rays in a row are looked at together, and how often in a lot, to tell whether they are scattered.
+const NEIGHBOURS: usize = 8;
+const LOOKS: usize = 16;
+
+/// Neighbours are scattered if they come to lie farther apart than this part of the scene's diagonal.
+const FAR_APART: f32 = 0.25;
+
+/// Whether most rays of the next lot run far from those beside them: whether a ray, from where it starts to where it leaves
+/// the scene, comes to be far from the first of its neighbours. Camera rays of a picture 64 pixels wide are not scattered,
+/// the same rays shuffled are, and so are parallel ones that start anywhere. NaNs are far from nothing.
+fn are_scattered(rays: &[Ray], bounds: &Aabb) -> bool {
+    let diagonal = (bounds.max - bounds.min).length();
+    let limit = FAR_APART * diagonal;
+    let groups = rays[..rays.len().min(LOT)].chunks_exact(NEIGHBOURS);
+    // Rows of a picture are as long as some power of two: what is looked at must not lie at the same place of each.
+    let apart = groups.len().div_ceil(LOOKS) | 1;
+    let (mut count, mut scattered) = (0, 0);
+    for group in groups.step_by(apart) {
+        let (first, others) = group.split_first().expect("a group has rays");
+        let way = first.direction.normalize_or_zero();
+        let is_far = |ray: &Ray| {
+            let turned = diagonal * (ray.direction.normalize_or_zero() - way).length();
+            (ray.origin - first.origin).length() + turned > limit
+        };
+        count += 1;
+        scattered += usize::from(others.iter().any(is_far));
+    }
+    2 * scattered > count
+}
 
 /// Kernels that are chosen among, and what was learnt about them. The second is what is used where memory is short.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +51,8 @@ struct Slices<const N: usize> {
     choice: Choice<N>,
     /// How many rays each has traced.
     traced: [u64; N],
+    /// With how many rays lists are tried.
+    trial_of_lists: usize,
 }
 
 /// What the next of some rays do.
@@ -32,33 +65,29 @@ struct Next {
 }
 
 impl<const N: usize> Slices<N> {
-    fn among(ways: [Kernel; N]) -> Self {
-        Self { ways, choice: Choice::default(), traced: [0; N] }
+    fn among(ways: [Kernel; N], trial_of_lists: usize) -> Self {
+        Self { ways, choice: Choice::default(), traced: [0; N], trial_of_lists }
     }
 
-    /// Has rays traced lot by lot; `trace` writes a lot's answers.
+    /// Has the next lot of rays traced, and says how many they were; `trace` writes their answers.
     fn trace<A>(
         &mut self,
         accel: &Accel,
-        mut rays: &[Ray],
-        mut answers: &mut [A],
+        rays: &[Ray],
+        answers: &mut [A],
         trace: impl Fn(Kernel, &[Ray], &mut [A]),
-    ) {
-        assert_eq!(rays.len(), answers.len(), "as many answers as rays");
-        while !rays.is_empty() {
-            let next = self.next(accel, rays.len());
-            let (now, later) = rays.split_at(next.rays);
-            let (answers_now, answers_later) = answers.split_at_mut(next.rays);
-            let kernel = self.ways[next.way];
-            if next.counts {
-                let choice = &mut self.choice;
-                recorded(accel, choice, next.way, next.rays, || trace(kernel, now, answers_now));
-            } else {
-                trace(kernel, now, answers_now);
-            }
-            self.traced[next.way] += next.rays as u64;
-            (rays, answers) = (later, answers_later);
+    ) -> usize {
+        let next = self.next(accel, rays.len());
+        let (rays, answers) = (&rays[..next.rays], &mut answers[..next.rays]);
+        let kernel = self.ways[next.way];
+        if next.counts {
+            let choice = &mut self.choice;
+            recorded(accel, choice, next.way, next.rays, || trace(kernel, rays, answers));
+        } else {
+            trace(kernel, rays, answers);
         }
+        self.traced[next.way] += next.rays as u64;
+        next.rays
     }
 
     fn next(&mut self, accel: &Accel, rays: usize) -> Next {
@@ -70,8 +99,26 @@ impl<const N: usize> Slices<N> {
             return Next { way: quickest, rays, counts: false };
         }
         let way = self.choice.next();
-        let whole = way == quickest || self.ways[way] == Kernel::Filter;
-        Next { way, rays: rays.min(if whole { LOT } else { TRIAL }), counts: true }
+        let most = match self.ways[way] {
+            _ if way == quickest => LOT,
+            Kernel::Filter => self.trial_of_lists,
+            _ => TRIAL,
+        };
+        Next { way, rays: rays.min(most), counts: true }
+    }
+
+    /// Kernels, and how many rays each has traced.
+    fn traced(self) -> impl Iterator<Item = (Kernel, u64)> {
+        self.ways.into_iter().zip(self.traced)
+    }
+}
+
+/// Has rays traced lot by lot: `lot` does the next ones and says how many they were.
+fn each_lot<A>(mut rays: &[Ray], mut answers: &mut [A], mut lot: impl FnMut(&[Ray], &mut [A]) -> usize) {
+    assert_eq!(rays.len(), answers.len(), "as many answers as rays");
+    while !rays.is_empty() {
+        let done = lot(rays, answers);
+        (rays, answers) = (&rays[done..], &mut std::mem::take(&mut answers)[done..]);
     }
 }
 
@@ -79,16 +126,20 @@ impl<const N: usize> Slices<N> {
 /// hit. One for each thread and, where several kinds of rays are told apart, for each kind.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceDispatch {
-    closest: Slices<6>,
-    any: Slices<5>,
+    closest: Slices<5>,
+    any: Slices<4>,
+    scattered: ScatteredDispatch,
 }
 
 impl Default for SliceDispatch {
     fn default() -> Self {
-        use Kernel::{Filter, Packet8, Packet16, Stream, Tile, WideTile};
+        use Kernel::{Filter, Packet8, Packet16, Tile, WideTile};
+        // Lists of rays that lie together are several times slower than beams, or quicker than packets already where few
+        // are tried.
         Self {
-            closest: Slices::among([Tile, Packet16, Packet8, Stream, Filter, WideTile]),
-            any: Slices::among([Tile, Packet16, Packet8, Stream, Filter]),
+            closest: Slices::among([Tile, Packet16, Packet8, Filter, WideTile], TRIAL),
+            any: Slices::among([Tile, Packet16, Packet8, Filter], TRIAL),
+            scattered: ScatteredDispatch::default(),
         }
     }
 }
@@ -96,18 +147,30 @@ impl Default for SliceDispatch {
 impl SliceDispatch {
     /// As [`Accel::intersect_many`], by the kernel that is quickest.
     pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
-        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits));
+        each_lot(rays, hits, |rays, hits| {
+            if are_scattered(rays, &accel.bounds()) {
+                return self.scattered.intersect_lot(accel, rays, hits);
+            }
+            self.closest
+                .trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits))
+        });
     }
 
     /// As [`Accel::occluded_many`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
-        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found));
+        each_lot(rays, occluded, |rays, occluded| {
+            if are_scattered(rays, &accel.bounds()) {
+                return self.scattered.occluded_lot(accel, rays, occluded);
+            }
+            self.any
+                .trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found))
+        });
     }
 
-    /// Kernels, and how many rays each has traced. One may be there twice: for closest hits, and for any hit.
+    /// Kernels, and how many rays each has traced. One may be there more than once.
     pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
-        let Self { closest, any } = *self;
-        closest.ways.into_iter().zip(closest.traced).chain(any.ways.into_iter().zip(any.traced))
+        let Self { closest, any, scattered } = *self;
+        closest.traced().chain(any.traced()).chain(scattered.closest.traced()).chain(scattered.any.traced())
     }
 }
 
@@ -122,19 +185,33 @@ pub struct ScatteredDispatch {
 impl Default for ScatteredDispatch {
     fn default() -> Self {
         use Kernel::{Filter, Packet16, Stream};
-        Self { closest: Slices::among([Filter, Stream]), any: Slices::among([Filter, Stream, Packet16]) }
+        // Lists are the better, the more rays there are.
+        Self {
+            closest: Slices::among([Filter, Stream], LOT),
+            any: Slices::among([Filter, Stream, Packet16], LOT),
+        }
     }
 }
 
 impl ScatteredDispatch {
     /// As [`Accel::intersect_many`], by the kernel that is quickest.
     pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
-        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits));
+        each_lot(rays, hits, |rays, hits| self.intersect_lot(accel, rays, hits));
+    }
+
+    /// The same for the next lot; how many rays that was.
+    fn intersect_lot(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) -> usize {
+        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits))
     }
 
     /// As [`Accel::occluded_many`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
-        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found));
+        each_lot(rays, occluded, |rays, occluded| self.occluded_lot(accel, rays, occluded));
+    }
+
+    /// The same for the next lot; how many rays that was.
+    fn occluded_lot(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) -> usize {
+        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found))
     }
 }
 
@@ -167,10 +244,54 @@ mod tests {
         assert!(hits.iter().any(Hit::is_hit) && !hits.iter().all(Hit::is_hit));
     }
 
+    /// Rays of a camera, row by row.
+    fn picture(width: usize, height: usize) -> Vec<Ray> {
+        let pixel = |i: usize| {
+            let x = (i % width) as f32 / width as f32 - 0.5;
+            let y = (i / width) as f32 / height as f32 - 0.5;
+            Ray::new(Vec3::new(0.5, 0.5, 3.0), Vec3::new(x, y, -2.0))
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    fn shuffled(mut rays: Vec<Ray>) -> Vec<Ray> {
+        let mut state = 1_u32;
+        for i in (1..rays.len()).rev() {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            rays.swap(i, (state >> 8) as usize % (i + 1));
+        }
+        rays
+    }
+
+    #[test]
+    fn rays_are_scattered_if_neighbours_run_far_from_one_another() {
+        let bounds = soup().bounds();
+        let are_scattered = |rays: &[Ray]| are_scattered(rays, &bounds);
+        assert!(are_scattered(&rays(0, LOT)));
+        assert!(!are_scattered(&picture(64, 64)));
+        assert!(are_scattered(&shuffled(picture(64, 64))));
+        // Wherever in a row a lot begins.
+        let wide = picture(256, 32);
+        assert!((0..256).all(|first| !are_scattered(&wide[first..])));
+        // Parallel rays, in order and not.
+        let mut parallel = picture(64, 64);
+        for ray in &mut parallel {
+            ray.origin += 2.0 * ray.direction;
+            ray.direction = Vec3::NEG_Z;
+        }
+        assert!(!are_scattered(&parallel));
+        assert!(are_scattered(&shuffled(parallel)));
+        // Few rays, and rays that are none.
+        assert!(!are_scattered(&[]));
+        assert!(!are_scattered(&rays(0, NEIGHBOURS - 1)));
+        assert!(!are_scattered(&[Ray::new(Vec3::NAN, Vec3::ZERO); LOT]));
+    }
+
     #[test]
     fn every_ray_is_answered_as_by_itself_and_counted() {
         let accel = soup();
-        let rays = rays(0, 120 * TRIAL + 5);
+        let mut rays = rays(0, 60 * TRIAL + 5);
+        rays.extend(picture(256, 241));
         let mut dispatch = SliceDispatch::default();
         let (mut hits, mut occluded) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
         dispatch.intersect(&accel, &rays, &mut hits);
@@ -192,8 +313,7 @@ mod tests {
             dispatch.occluded(&accel, &rays, &mut occluded);
             check(&accel, &rays, &hits, &occluded);
         }
-        let Slices { traced: closest, .. } = dispatch.closest;
-        let Slices { traced: any, .. } = dispatch.any;
-        assert!(closest.iter().chain(&any).all(|&rays| rays > 0), "all ways are tried: {closest:?} {any:?}");
+        let traced: Vec<(Kernel, u64)> = dispatch.closest.traced().chain(dispatch.any.traced()).collect();
+        assert!(traced.iter().all(|&(_, rays)| rays > 0), "all ways are tried: {traced:?}");
     }
 }

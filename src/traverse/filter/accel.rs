@@ -1,61 +1,44 @@
 //! Lists of rays through an [`Accel`].
 
+use super::source::Source;
 use super::{ByEights, trace};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
-use crate::simd::Simd;
-use crate::traverse::accel::lanes_of;
+use crate::simd::{Eight, Simd};
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
-use crate::traverse::stream::{Any, Closest};
-use crate::traverse::tile::{PACKETS, WIDE};
-use crate::traverse::{Accel, RayPacket};
-use glam::Vec3;
+use crate::traverse::stream::{Answers, Any, Closest};
+use crate::traverse::{Accel, RayPacket, closest};
 
 impl Accel {
     /// The closest hit of each ray, by lists of rays.
     pub(in crate::traverse) fn intersect_filtered(&self, rays: &[Ray], hits: &mut [Hit]) {
-        self.ask_all_in_memory(Filter { rays, answers: Closest(hits) });
+        self.ask_all_in_memory(Filter { rays: Source::Slice(rays), answers: Closest(hits) });
     }
 
     /// Whether anything lies in each ray's interval, likewise.
     pub(in crate::traverse) fn occluded_filtered(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.ask_all_in_memory(Filter { rays, answers: Any(occluded) });
+        self.ask_all_in_memory(Filter { rays: Source::Slice(rays), answers: Found::Rays(occluded) });
     }
 
-    /// A bit for each lane set in `active` in whose interval anything lies, packet by packet, for as many packets as a wide
-    /// beam has. Panics if there are more.
+    /// A bit for each lane set in `active` in whose interval anything lies, packet by packet.
     pub(in crate::traverse) fn occluded_lists(
         &self,
         rays: &[RayPacket<16>],
         active: &[u32],
         occluded: &mut [u32],
     ) {
-        const MOST: usize = WIDE * PACKETS * 16;
-        assert!(rays.len() <= WIDE * PACKETS, "at most {} packets", WIDE * PACKETS);
-        let mut all = [const { Ray::new(Vec3::ZERO, Vec3::ZERO) }; MOST];
-        let mut places = [(0, 0); MOST];
-        let mut count = 0;
-        for (packet, (rays, &active)) in rays.iter().zip(active).enumerate() {
-            let mut lanes = active & lanes_of(16);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                (all[count], places[count]) = (rays.get(lane), (packet, lane));
-                count += 1;
-            }
-        }
-        let mut found = [false; MOST];
-        self.occluded_filtered(&all[..count], &mut found[..count]);
+        assert!(rays.len() == active.len() && rays.len() == occluded.len(), "as many lanes as packets");
         occluded.fill(0);
-        for (&(packet, lane), found) in places.iter().zip(found).take(count) {
-            occluded[packet] |= u32::from(found) << lane;
-        }
+        self.ask_all_in_memory(Filter {
+            rays: Source::Packets(rays, active),
+            answers: Found::Lanes(occluded),
+        });
     }
 }
 
 struct Filter<'a, A> {
-    rays: &'a [Ray],
+    rays: Source<'a>,
     answers: A,
 }
 
@@ -63,5 +46,49 @@ impl<A: ByEights> ResidentQuery for Filter<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         trace::<S, M, A>(tree, self.rays, &mut self.answers);
+    }
+}
+
+/// Whether rays hit anything.
+enum Found<'a> {
+    /// One by one.
+    Rays(&'a mut [bool]),
+    /// Sixteen by sixteen, a bit for each; none is set beforehand.
+    Lanes(&'a mut [u32]),
+}
+
+impl Answers for Found<'_> {
+    const ANY: bool = true;
+
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
+        let mut found = [false];
+        Any(&mut found).odd::<M>(tree, 0, ray);
+        match self {
+            Self::Rays(rays) => [rays[number]] = found,
+            Self::Lanes(lanes) => lanes[number / 16] |= u32::from(found[0]) << (number % 16),
+        }
+    }
+}
+
+impl ByEights for Found<'_> {
+    #[inline(always)]
+    fn found_by_eight<L: Eight, M: Mode>(
+        &mut self,
+        _: &Resident<'_, M::Record>,
+        _: Source<'_>,
+        eight: usize,
+        closest: &closest::Closest<8, L>,
+    ) {
+        let found = closest.found() & 0xff;
+        match self {
+            Self::Rays(rays) => {
+                for (lane, ray) in rays[8 * eight..].iter_mut().take(8).enumerate() {
+                    *ray = found >> lane & 1 == 1;
+                }
+            }
+            Self::Lanes(lanes) => lanes[eight / 2] |= found << (8 * (eight % 2)),
+        }
     }
 }

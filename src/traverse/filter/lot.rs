@@ -1,14 +1,19 @@
 //! A lot of rays: where each starts, how it runs, and what it has found.
 
+use super::source::Source;
 use crate::geometry::{Aabb, Ray};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Lanes, Mask};
 use crate::traverse::closest::{Closest, NONE};
 use crate::traverse::kernel::Kernel;
-use crate::traverse::lanes::RayPacket;
 use crate::traverse::ready::Ready;
 use crate::traverse::stream::step::Planes;
 use crate::traverse::walk::{MARGIN, load3};
+use glam::Vec3;
+use std::ops::Range;
+
+/// What stands where there is no ray.
+const NOTHING: Ray = Ray::new(Vec3::ZERO, Vec3::ZERO);
 
 /// Rays in a lot.
 pub const LOT: usize = Kernel::Filter.width();
@@ -67,40 +72,38 @@ impl Lot {
         }
     }
 
-    /// Takes so many rays to be odd, all of them.
-    pub fn leave(&mut self, count: usize) {
-        self.odd[..count.div_ceil(8)].fill(0xff);
-        if !count.is_multiple_of(8) {
-            self.odd[count / 8] = (1 << (count % 8)) - 1;
+    /// Takes all rays of up to [`LOT`] places, those of some eights, to be odd.
+    pub fn leave(&mut self, rays: Source<'_>, eights: Range<usize>) {
+        for (of_lot, eight) in eights.enumerate() {
+            self.odd[of_lot] = rays.eight(eight).1 as u8;
         }
-        for traveller in &mut self.travellers[..count.next_multiple_of(8)] {
+        for traveller in &mut self.travellers {
             traveller.inverse[3] = f32::from_bits(NONE as u32);
         }
     }
 
-    /// Makes up to [`LOT`] rays ready.
+    /// Makes the rays of up to [`LOT`] places ready, those of some eights.
     #[inline(always)]
-    pub fn prepare<L: Eight>(&mut self, rays: &[Ray], bounds: &Aabb) {
+    pub fn prepare<L: Eight>(&mut self, rays: Source<'_>, eights: Range<usize>, bounds: &Aabb) {
         self.counts = [0; 8];
         let mut greatest_reach = L::splat(0.0);
-        for (eight, rays) in rays.chunks(8).enumerate() {
-            let reach = self.prepare_eight::<L>(rays, eight % (LOT / 8), bounds);
+        for (of_lot, eight) in eights.enumerate() {
+            let reach = self.prepare_eight::<L>(rays, eight, of_lot % (LOT / 8), bounds);
             greatest_reach = reach.max(greatest_reach);
         }
         self.thickness = greatest_reach.greatest() * MARGIN;
     }
 
-    /// Up to eight of them; how far the scene reaches from each of those that meet it.
+    /// Eight of them, to be the lot's number `of_lot`; how far the scene reaches from each of those that meet it.
     #[inline(always)]
-    fn prepare_eight<L: Eight>(&mut self, rays: &[Ray], eight: usize, bounds: &Aabb) -> L {
-        let packet = RayPacket::<8>::of_slice(rays);
-        let present = (1u32 << rays.len().min(8)) - 1;
+    fn prepare_eight<L: Eight>(&mut self, rays: Source<'_>, eight: usize, of_lot: usize, bounds: &Aabb) -> L {
+        let (packet, present) = rays.eight(eight);
         let (origin, direction) = (load3::<8, L>(&packet.origin), load3::<8, L>(&packet.direction));
         let (tnear, tfar) = (L::load(&packet.tnear), L::load(&packet.tfar));
         let Ready { inverse, reach, tmin, tmax, closest, ordinary, flies, .. } =
             Ready::new(&origin, &direction, tnear, tfar, bounds);
-        self.odd[eight] = (!ordinary & present) as u8;
-        let place = 8 * eight;
+        self.odd[of_lot] = (!ordinary & present) as u8;
+        let place = 8 * of_lot;
         *self.tmin[place..].first_chunk_mut().expect("eights fill the lot") = tmin.store();
         *self.tmax[place..].first_chunk_mut().expect("eights fill the lot") = tmax.store();
 
@@ -111,16 +114,20 @@ impl Lot {
         }
         let closest = closest.store();
         let inverse = [inverse[0].store(), inverse[1].store(), inverse[2].store()];
-        for (lane, ray) in rays.iter().enumerate().take(8) {
+        let mut start = |lane: usize, ray: &Ray| {
             self.travellers[place + lane] = Traveller {
                 start: [ray.origin.x, ray.origin.y, ray.origin.z, closest[lane]],
                 inverse: [inverse[0][lane], inverse[1][lane], inverse[2][lane], f32::from_bits(NONE as u32)],
             };
             self.ways[place + lane] = [ray.direction.x, ray.direction.y, ray.direction.z, ray.tnear];
-        }
-        // Where no rays are, those of an earlier lot may have found something.
-        for traveller in &mut self.travellers[place + rays.len()..place + 8] {
-            traveller.inverse[3] = f32::from_bits(NONE as u32);
+        };
+        if let Some(row) = rays.row(eight) {
+            row.iter().enumerate().for_each(|(lane, ray)| start(lane, ray));
+        } else {
+            // Where there is no ray, one of an earlier lot may have found something: what is put there looks for nothing.
+            for lane in 0..8 {
+                start(lane, &if present >> lane & 1 == 1 { rays.ray(8 * eight + lane) } else { NOTHING });
+            }
         }
         let mut left = flies & present;
         while left != 0 {
@@ -132,7 +139,7 @@ impl Lot {
             self.octants[octant][*count % LOT] = (place + lane) as i32;
             *count += 1;
         }
-        L::select(L::mask_from_bits(flies), reach, zero)
+        L::select(L::mask_from_bits(flies & present), reach, zero)
     }
 
     /// The rays that run into an octant.

@@ -25,28 +25,29 @@ mod cut;
 mod leaf;
 mod lists;
 mod lot;
+mod source;
 
 use super::closest::Closest;
-use super::lanes::RayPacket;
 use super::records::Resident;
 use super::stream::{self, Answers};
 use super::walk::load3;
-use crate::geometry::Ray;
 use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::{Exit, Tree};
 use crate::simd::{Eight, Simd};
 use lists::{Entries, Heads};
 use lot::{LOT, Lot};
+use source::Source;
 use std::cell::Cell;
+use std::ops::Range;
 
 /// What is asked of each ray, eight answers at a time.
 pub trait ByEights: Answers {
-    /// What up to eight rays from number `first` on have found.
+    /// What the rays in the places from number `8 * eight` on have found.
     fn found_by_eight<L: Eight, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
-        rays: &RayPacket<8>,
-        first: usize,
+        rays: Source<'_>,
+        eight: usize,
         closest: &Closest<8, L>,
     );
 }
@@ -56,30 +57,15 @@ impl ByEights for stream::Closest<'_> {
     fn found_by_eight<L: Eight, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
-        rays: &RayPacket<8>,
-        first: usize,
+        rays: Source<'_>,
+        eight: usize,
         closest: &Closest<8, L>,
     ) {
+        let (rays, _) = rays.eight(eight);
         let test = M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), closest.found());
         let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test));
-        for (lane, hit) in self.0[first..].iter_mut().take(8).enumerate() {
+        for (lane, hit) in self.0[8 * eight..].iter_mut().take(8).enumerate() {
             *hit = found.get(lane);
-        }
-    }
-}
-
-impl ByEights for stream::Any<'_> {
-    #[inline(always)]
-    fn found_by_eight<L: Eight, M: Mode>(
-        &mut self,
-        _: &Resident<'_, M::Record>,
-        _: &RayPacket<8>,
-        first: usize,
-        closest: &Closest<8, L>,
-    ) {
-        let found = closest.found();
-        for (lane, occluded) in self.0[first..].iter_mut().take(8).enumerate() {
-            *occluded = found >> lane & 1 == 1;
         }
     }
 }
@@ -100,7 +86,7 @@ thread_local! {
 #[inline(always)]
 pub fn trace<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
-    rays: &[Ray],
+    rays: Source<'_>,
     answers: &mut A,
 ) {
     // Taken out, not borrowed: a closure would be compiled without the instruction set.
@@ -112,18 +98,20 @@ pub fn trace<S: Simd, M: Mode, A: ByEights>(
     };
     let room = &mut *boxed;
     let is_scaled = !resident.scale().is_none();
-    for (i, lot) in rays.chunks(LOT).enumerate() {
+    let eights = rays.places().div_ceil(8);
+    for first in (0..eights).step_by(LOT / 8) {
+        let eights = first..eights.min(first + LOT / 8);
         if is_scaled {
-            room.lot.leave(lot.len());
+            room.lot.leave(rays, eights.clone());
         } else {
-            room.lot.prepare::<S::F8>(lot, resident.bounds());
+            room.lot.prepare::<S::F8>(rays, eights.clone(), resident.bounds());
             if A::ANY {
                 walk::<S, M, true>(resident, room);
             } else {
                 walk::<S, M, false>(resident, room);
             }
         }
-        give::<S, M, A>(resident, rays, i * LOT, &room.lot, answers);
+        give::<S, M, A>(resident, rays, eights, &room.lot, answers);
     }
     ROOM.set(Some(boxed));
 }
@@ -183,23 +171,23 @@ fn walk<S: Simd, M: Mode, const ANY: bool>(resident: &Resident<'_, M::Record>, r
     }
 }
 
-/// Gives the answers of a lot's rays, those of `rays` from number `first` on.
+/// Gives the answers of a lot's rays, those of some eights.
 #[inline(always)]
 fn give<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
-    rays: &[Ray],
-    first: usize,
+    rays: Source<'_>,
+    eights: Range<usize>,
     lot: &Lot,
     answers: &mut A,
 ) {
-    for (eight, of_lot) in rays[first..].chunks(8).take(LOT / 8).enumerate() {
-        let (packet, first) = (RayPacket::<8>::of_slice(of_lot), first + 8 * eight);
-        answers.found_by_eight::<S::F8, M>(resident, &packet, first, &lot.closest::<S::F8>(eight));
-        let mut odd = lot.odd(eight);
+    for (of_lot, eight) in eights.enumerate() {
+        answers.found_by_eight::<S::F8, M>(resident, rays, eight, &lot.closest::<S::F8>(of_lot));
+        let mut odd = lot.odd(of_lot);
         while odd != 0 {
             let lane = odd.trailing_zeros() as usize & 7;
             odd &= odd - 1;
-            answers.odd::<M>(resident, first + lane, rays);
+            let place = 8 * eight + lane;
+            answers.odd::<M>(resident, place, &rays.ray(place));
         }
     }
 }

@@ -3,11 +3,12 @@
 use super::cut::{cut, take_one};
 use super::lists::{Entries, Heads, List};
 use super::lot::{LOT, Lot};
+use super::source::Source;
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, Tree};
 use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, Task};
-use crate::traverse::{Accel, Kernel};
+use crate::traverse::{Accel, Kernel, RayPacket};
 use glam::Vec3;
 
 /// Numbers between -1 and 1 that look like chance.
@@ -51,7 +52,7 @@ impl Task for Cuts<'_> {
     fn run<S: Simd>(self) -> Self::Output {
         let (tree, rays) = (self.0.tree(), self.1);
         let mut lot = Box::new(Lot::new());
-        lot.prepare::<S::F8>(rays, tree.bounds());
+        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), tree.bounds());
         let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
         for octant in 0..8 {
             let ids = lot.octant(octant);
@@ -170,4 +171,36 @@ fn every_ray_of_every_lot_is_answered_as_alone() {
     let mut hits = vec![Hit::MISS; LOT];
     tree.intersect_many(Kernel::Filter, &sets[1], &mut hits);
     assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 100, "there is something to hit");
+}
+
+#[test]
+fn lanes_of_packets_are_answered_as_alone_and_no_others() {
+    let tree = Accel::build(&shapes::soup(3000, 2), &BuildParams::default()).expect("a soup has a tree");
+    let mut rays = rays(LOT + 16 * 7, true, 0.6);
+    for ray in rays.iter_mut().step_by(29) {
+        ray.direction *= 1e36;
+    }
+    let mut packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+    let active: Vec<u32> =
+        (0..packets.len() as u32).map(|i| (i.wrapping_mul(0x9e37_79b9) >> 16) & 0xffff).collect();
+    let is_active = |i: usize| active[i / 16] >> (i % 16) & 1 == 1;
+    // What is in the other lanes is of no account.
+    for i in (0..rays.len()).filter(|&i| !is_active(i)) {
+        let nothing = [Vec3::NAN, Vec3::splat(1e30), Vec3::ZERO][i % 3];
+        packets[i / 16].set(i % 16, &Ray::new(nothing, Vec3::ONE));
+    }
+    for isa in Isa::available() {
+        for accuracy in Accuracy::ALL {
+            let accel = tree.clone().with_isa(isa).with_accuracy(accuracy);
+            let mut occluded = vec![!0; packets.len()];
+            accel.occluded_lists(&packets, &active, &mut occluded);
+            for (i, ray) in rays.iter().enumerate() {
+                let found = occluded[i / 16] >> (i % 16) & 1 == 1;
+                assert_eq!(found, is_active(i) && accel.occluded(ray), "ray {i} on {isa}, {accuracy}");
+            }
+            assert!(occluded.iter().all(|lanes| lanes >> 16 == 0));
+            let found: u32 = occluded.iter().map(|lanes| lanes.count_ones()).sum();
+            assert!((100..2000).contains(&found), "{found} of {} rays", rays.len());
+        }
+    }
 }

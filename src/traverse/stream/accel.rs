@@ -1,6 +1,6 @@
 //! Streams of rays through an [`Accel`].
 
-use super::{Answers, Any, Closest, trace};
+use super::{Any, Closest, OneByOne, trace};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::simd::Simd;
@@ -25,7 +25,7 @@ struct Stream<'a, A> {
     answers: A,
 }
 
-impl<A: Answers> ResidentQuery for Stream<'_, A> {
+impl<A: OneByOne> ResidentQuery for Stream<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         // Rays have numbers of 32 bits.

@@ -51,14 +51,17 @@ pub trait Answers {
     /// Whether any hit will do.
     const ANY: bool;
 
+    /// A ray that the packet kernel has to trace.
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray);
+}
+
+/// The same where each ray has its answer by itself.
+pub trait OneByOne: Answers {
     /// A ray's answer: the closest hit that was found, or any.
     fn found<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>);
 
     /// A ray that hits nothing.
     fn missed(&mut self, ray: usize);
-
-    /// A ray that the packet kernel has to trace.
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]);
 }
 
 /// Records of closest hits.
@@ -67,6 +70,15 @@ pub struct Closest<'a>(pub &'a mut [Hit]);
 impl Answers for Closest<'_> {
     const ANY: bool = false;
 
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
+        let rays = RayPacket::of_slice(&[*ray]);
+        self.0[number] = packet::intersect::<1, f32, _, M>(tree, &rays, 1).get(0);
+    }
+}
+
+impl OneByOne for Closest<'_> {
     #[inline(always)]
     fn found<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>) {
         let record = &tree.records[flight.primitive as usize];
@@ -86,13 +98,6 @@ impl Answers for Closest<'_> {
     fn missed(&mut self, ray: usize) {
         self.0[ray] = Hit::MISS;
     }
-
-    #[cold]
-    #[inline(never)]
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]) {
-        let rays = RayPacket::of_slice(&[rays[ray]]);
-        self.0[ray] = packet::intersect::<1, f32, _, M>(tree, &rays, 1).get(0);
-    }
 }
 
 /// Whether rays hit anything.
@@ -101,6 +106,15 @@ pub struct Any<'a>(pub &'a mut [bool]);
 impl Answers for Any<'_> {
     const ANY: bool = true;
 
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
+        let rays = RayPacket::of_slice(&[*ray]);
+        self.0[number] = packet::occluded::<1, f32, _, M>(tree, &rays, 1) == 1;
+    }
+}
+
+impl OneByOne for Any<'_> {
     #[inline(always)]
     fn found<M: Mode>(&mut self, _tree: &Resident<'_, M::Record>, flight: &Flight<M::Alone>) {
         self.0[flight.ray as usize] = true;
@@ -109,13 +123,6 @@ impl Answers for Any<'_> {
     #[inline(always)]
     fn missed(&mut self, ray: usize) {
         self.0[ray] = false;
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, rays: &[Ray]) {
-        let rays = RayPacket::of_slice(&[rays[ray]]);
-        self.0[ray] = packet::occluded::<1, f32, _, M>(tree, &rays, 1) == 1;
     }
 }
 
@@ -178,7 +185,7 @@ thread_local! {
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
-pub fn trace<S: Simd, M: Mode, A: Answers>(
+pub fn trace<S: Simd, M: Mode, A: OneByOne>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
@@ -191,7 +198,7 @@ pub fn trace<S: Simd, M: Mode, A: Answers>(
 }
 
 #[inline(always)]
-fn fly<S: Simd, M: Mode, A: Answers>(
+fn fly<S: Simd, M: Mode, A: OneByOne>(
     resident: &Resident<'_, M::Record>,
     rays: &[Ray],
     answers: &mut A,
@@ -199,8 +206,8 @@ fn fly<S: Simd, M: Mode, A: Answers>(
 ) {
     let Resident { tree, records } = *resident;
     if !tree.scale().is_none() {
-        for number in 0..rays.len() {
-            answers.odd::<M>(resident, number, rays);
+        for (number, ray) in rays.iter().enumerate() {
+            answers.odd::<M>(resident, number, ray);
         }
         return;
     }
@@ -224,7 +231,7 @@ fn fly<S: Simd, M: Mode, A: Answers>(
             for (lane, ray) in eight.iter().enumerate() {
                 let number = ahead + lane;
                 if group.odd >> lane & 1 == 1 {
-                    answers.odd::<M>(resident, number, rays);
+                    answers.odd::<M>(resident, number, ray);
                 } else if group.flies >> lane & 1 == 0 {
                     answers.missed(number);
                 } else {
