@@ -41,7 +41,7 @@ pub struct Args {
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        default_value = "tile,packet16,packet8,stream,mixed"
+        default_value = "tile,tile1024,packet16,packet8,stream,filter,mixed"
     )]
     modes: Vec<String>,
     /// Width and height of the camera's image, and as many rays of each kind at most
