@@ -1,6 +1,6 @@
 //! A mesh made ready for tracing, and the calls that trace.
 
-use super::lanes::{HitPacket, RayPacket};
+use super::lanes::{HitPacket, RayPacket, lanes_of};
 use super::query::{CountTile, InMode, IntersectTile, OccludedTile, Query, ResidentInMode, ResidentQuery};
 use super::records::Resident;
 use super::sieve::{Sieve, Sifted};
@@ -411,9 +411,4 @@ fn tile_lanes<const K: usize>(rays: &[RayPacket<16>], active: &[u32]) -> [[u32; 
         *lanes = active & lanes_of(16);
     }
     lanes
-}
-
-/// The first `count` lanes, at most 16.
-pub(super) const fn lanes_of(count: usize) -> u32 {
-    (1 << count) - 1
 }

@@ -17,6 +17,11 @@ pub struct RayPacket<const W: usize> {
     pub tfar: [f32; W],
 }
 
+/// The first `count` lanes, at most 16.
+pub(super) const fn lanes_of(count: usize) -> u32 {
+    (1 << count) - 1
+}
+
 impl<const W: usize> RayPacket<W> {
     /// A packet of rays with empty intervals, which hit nothing.
     pub const fn empty() -> Self {
@@ -31,6 +36,22 @@ impl<const W: usize> RayPacket<W> {
             packet.set(lane, ray);
         }
         packet
+    }
+
+    /// Puts rays into as many packets as they fill, and says of each which lanes hold one; how many packets these are.
+    /// Panics if there are more rays than `packets` or `active` have room for.
+    pub(crate) fn fill(rays: &[Ray], packets: &mut [Self], active: &mut [u32]) -> usize {
+        let count = rays.len().div_ceil(W);
+        let places = packets[..count].iter_mut().zip(&mut active[..count]);
+        for (rays, (packet, active)) in rays.chunks(W).zip(places) {
+            if let Some(rays) = rays.first_chunk::<W>() {
+                rays.iter().enumerate().for_each(|(lane, ray)| packet.set(lane, ray));
+            } else {
+                *packet = Self::of_slice(rays);
+            }
+            *active = lanes_of(rays.len());
+        }
+        count
     }
 
     /// Puts a ray into a lane. Panics if there is no such lane.
@@ -85,6 +106,13 @@ pub struct HitPacket<const W: usize> {
     pub normal: [[f32; W]; 3],
 }
 
+/// Says one by one which lanes of packets of `W` are set, as many as there is room for.
+pub(crate) fn give_lanes<const W: usize>(packets: &[u32], flags: &mut [bool]) {
+    for (lanes, flags) in packets.iter().zip(flags.chunks_mut(W)) {
+        flags.iter_mut().enumerate().for_each(|(lane, flag)| *flag = lanes >> lane & 1 == 1);
+    }
+}
+
 impl<const W: usize> HitPacket<W> {
     /// A packet of misses.
     pub const fn miss() -> Self {
@@ -106,6 +134,13 @@ impl<const W: usize> HitPacket<W> {
             v: self.v[lane],
             primitive: self.primitive[lane],
             normal: Vec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]),
+        }
+    }
+
+    /// Gives the hits of packets one by one, as many as there is room for.
+    pub(crate) fn give(packets: &[Self], hits: &mut [Hit]) {
+        for (packet, hits) in packets.iter().zip(hits.chunks_mut(W)) {
+            hits.iter_mut().enumerate().for_each(|(lane, hit)| *hit = packet.get(lane));
         }
     }
 

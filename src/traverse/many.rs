@@ -1,8 +1,8 @@
 //! Rays in slices, by the kernel named.
 
-use super::accel::{Accel, lanes_of};
+use super::accel::Accel;
 use super::kernel::Kernel;
-use super::lanes::{HitPacket, RayPacket};
+use super::lanes::{HitPacket, RayPacket, give_lanes, lanes_of};
 use super::tile::{PACKETS, WIDE};
 use super::width::PacketWidth;
 use crate::geometry::{Hit, Ray};
@@ -49,9 +49,7 @@ impl Accel {
     {
         for (rays, hits) in rays.chunks(W).zip(hits.chunks_mut(W)) {
             let found = self.intersect_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = found.get(lane);
-            }
+            HitPacket::give(&[found], hits);
         }
     }
 
@@ -61,9 +59,7 @@ impl Accel {
     {
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
             let found = self.occluded_packet(&RayPacket::<W>::of_slice(rays), lanes_of(rays.len()));
-            for (lane, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = found >> lane & 1 == 1;
-            }
+            give_lanes::<W>(&[found], occluded);
         }
     }
 
@@ -76,11 +72,7 @@ impl Accel {
         for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
             let (packets, active) = squares.fill(rays);
             self.intersect_tile(packets, active, &mut found[..packets.len()]);
-            for (hits, found) in hits.chunks_mut(16).zip(&*found) {
-                for (lane, hit) in hits.iter_mut().enumerate() {
-                    *hit = found.get(lane);
-                }
-            }
+            HitPacket::give(found, hits);
         }
     }
 
@@ -90,9 +82,7 @@ impl Accel {
         for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
             let (packets, active) = squares.fill(rays);
             self.occluded_tile(packets, active, &mut found[..packets.len()]);
-            for (i, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = found[i / 16] >> (i % 16) & 1 == 1;
-            }
+            give_lanes::<16>(&found, occluded);
         }
     }
 }
@@ -109,20 +99,10 @@ impl<const K: usize> Squares<K> {
         Self { packets: [const { [const { RayPacket::empty() }; PACKETS] }; K], active: [[0; PACKETS]; K] }
     }
 
-    /// Takes up as many rays as there is room for at most, and gives the packets that they fill, with their lanes.
+    /// Takes up rays, no more than there is room for, and gives the packets that they fill, with their lanes.
     fn fill(&mut self, rays: &[Ray]) -> (&[RayPacket<16>], &[u32]) {
         let (packets, active) = (self.packets.as_flattened_mut(), self.active.as_flattened_mut());
-        for ((rays, packet), active) in rays.chunks(16).zip(&mut *packets).zip(&mut *active) {
-            if let Ok(rays) = <&[Ray; 16]>::try_from(rays) {
-                for (lane, ray) in rays.iter().enumerate() {
-                    packet.set(lane, ray);
-                }
-            } else {
-                *packet = RayPacket::of_slice(rays);
-            }
-            *active = lanes_of(rays.len());
-        }
-        let count = rays.len().div_ceil(16);
+        let count = RayPacket::fill(rays, packets, active);
         (&packets[..count], &active[..count])
     }
 }

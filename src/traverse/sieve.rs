@@ -7,7 +7,7 @@
 //! instances, in which nothing of this is left.
 
 use super::accel::Accel;
-use super::lanes::{HitPacket, RayPacket};
+use super::lanes::{HitPacket, RayPacket, give_lanes, lanes_of};
 use super::query::{IntersectPackets, OccludedPackets};
 use super::records::{Records, Resident};
 use crate::geometry::triangle::{Candidate, Mode, Test};
@@ -130,13 +130,11 @@ impl Accel {
     pub fn intersect_sifted(&self, sieve: &dyn Sieve, rays: &[Ray], hits: &mut [Hit]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         for (rays, hits) in rays.chunks(8).zip(hits.chunks_mut(8)) {
-            let (packet, active) = (RayPacket::<8>::of_slice(rays), (1 << rays.len()) - 1);
+            let (packet, active) = (RayPacket::<8>::of_slice(rays), lanes_of(rays.len()));
             let mut found = [HitPacket::<8>::miss()];
             let query = IntersectPackets { rays: &[packet], active: &[active], hits: &mut found };
             self.ask_sifted(sieve, query);
-            for (lane, hit) in hits.iter_mut().enumerate() {
-                *hit = found[0].get(lane);
-            }
+            HitPacket::give(&found, hits);
         }
     }
 
@@ -145,13 +143,11 @@ impl Accel {
     pub fn occluded_sifted(&self, sieve: &dyn Sieve, rays: &[Ray], occluded: &mut [bool]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         for (rays, occluded) in rays.chunks(8).zip(occluded.chunks_mut(8)) {
-            let (packet, active) = (RayPacket::<8>::of_slice(rays), (1 << rays.len()) - 1);
+            let (packet, active) = (RayPacket::<8>::of_slice(rays), lanes_of(rays.len()));
             let mut found = [0];
             let query = OccludedPackets { rays: &[packet], active: &[active], found: &mut found };
             self.ask_sifted(sieve, query);
-            for (lane, occluded) in occluded.iter_mut().enumerate() {
-                *occluded = found[0] >> lane & 1 == 1;
-            }
+            give_lanes::<8>(&found, occluded);
         }
     }
 }

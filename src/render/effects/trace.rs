@@ -6,7 +6,7 @@ use super::path::Way;
 use crate::geometry::{Hit, Ray};
 use crate::scene::Surface;
 use crate::scene::effects::Effect;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch};
+use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch, give_lanes};
 
 /// Rays that go to a kernel at once: as many as a wide beam holds.
 const LOT: usize = Kernel::WideTile.width();
@@ -50,11 +50,7 @@ impl Default for Packets {
 impl Packets {
     /// Takes up at most a lot of rays, and says how many packets they fill.
     fn fill(&mut self, rays: &[Ray]) -> usize {
-        for ((rays, packet), active) in rays.chunks(16).zip(&mut self.rays).zip(&mut self.active) {
-            *packet = RayPacket::of_slice(rays);
-            *active = ((1_u64 << rays.len()) - 1) as u32;
-        }
-        rays.len().div_ceil(16)
+        RayPacket::fill(rays, &mut self.rays, &mut self.active)
     }
 }
 
@@ -91,9 +87,7 @@ impl Tracer {
                         &packets.active[..count],
                         found,
                     );
-                    for (i, hit) in hits.iter_mut().enumerate() {
-                        *hit = found[i / 16].get(i % 16);
-                    }
+                    HitPacket::give(found, hits);
                 }
             }
             (kernel, _) => accel.intersect_many(kernel, rays, hits),
@@ -133,9 +127,7 @@ impl Tracer {
                     &packets.active[..count],
                     lanes,
                 );
-                for (i, found) in found.iter_mut().enumerate() {
-                    *found = lanes[i / 16] >> (i % 16) & 1 == 1;
-                }
+                give_lanes::<16>(lanes, found);
             }
         }
         for (&to, &found) in to.iter().zip(&self.found) {

@@ -90,6 +90,16 @@ impl<const N: usize> Slices<N> {
         next.rays
     }
 
+    /// As [`Accel::intersect_many`] for the next lot; how many rays it was.
+    fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) -> usize {
+        self.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits))
+    }
+
+    /// As [`Accel::occluded_many`], likewise.
+    fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) -> usize {
+        self.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found))
+    }
+
     fn next(&mut self, accel: &Accel, rays: usize) -> Next {
         if accel.cached().is_some_and(|cached| cached.is_short()) {
             return Next { way: FRUGAL, rays: rays.min(LOT), counts: false };
@@ -147,23 +157,27 @@ impl Default for SliceDispatch {
 impl SliceDispatch {
     /// As [`Accel::intersect_many`], by the kernel that is quickest.
     pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
+        let Self { closest, scattered, .. } = self;
+        let bounds = accel.bounds();
         each_lot(rays, hits, |rays, hits| {
-            if are_scattered(rays, &accel.bounds()) {
-                return self.scattered.intersect_lot(accel, rays, hits);
+            if are_scattered(rays, &bounds) {
+                scattered.closest.intersect(accel, rays, hits)
+            } else {
+                closest.intersect(accel, rays, hits)
             }
-            self.closest
-                .trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits))
         });
     }
 
     /// As [`Accel::occluded_many`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
+        let Self { any, scattered, .. } = self;
+        let bounds = accel.bounds();
         each_lot(rays, occluded, |rays, occluded| {
-            if are_scattered(rays, &accel.bounds()) {
-                return self.scattered.occluded_lot(accel, rays, occluded);
+            if are_scattered(rays, &bounds) {
+                scattered.any.occluded(accel, rays, occluded)
+            } else {
+                any.occluded(accel, rays, occluded)
             }
-            self.any
-                .trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found))
         });
     }
 
@@ -196,22 +210,12 @@ impl Default for ScatteredDispatch {
 impl ScatteredDispatch {
     /// As [`Accel::intersect_many`], by the kernel that is quickest.
     pub fn intersect(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) {
-        each_lot(rays, hits, |rays, hits| self.intersect_lot(accel, rays, hits));
-    }
-
-    /// The same for the next lot; how many rays that was.
-    fn intersect_lot(&mut self, accel: &Accel, rays: &[Ray], hits: &mut [Hit]) -> usize {
-        self.closest.trace(accel, rays, hits, |kernel, rays, hits| accel.intersect_many(kernel, rays, hits))
+        each_lot(rays, hits, |rays, hits| self.closest.intersect(accel, rays, hits));
     }
 
     /// As [`Accel::occluded_many`], by the kernel that is quickest.
     pub fn occluded(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) {
-        each_lot(rays, occluded, |rays, occluded| self.occluded_lot(accel, rays, occluded));
-    }
-
-    /// The same for the next lot; how many rays that was.
-    fn occluded_lot(&mut self, accel: &Accel, rays: &[Ray], occluded: &mut [bool]) -> usize {
-        self.any.trace(accel, rays, occluded, |kernel, rays, found| accel.occluded_many(kernel, rays, found))
+        each_lot(rays, occluded, |rays, occluded| self.any.occluded(accel, rays, occluded));
     }
 }
 

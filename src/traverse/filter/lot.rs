@@ -74,10 +74,11 @@ impl Lot {
 
     /// Takes all rays of up to [`LOT`] places, those of some eights, to be odd.
     pub fn leave(&mut self, rays: Source<'_>, eights: Range<usize>) {
+        let places = 8 * eights.len();
         for (of_lot, eight) in eights.enumerate() {
             self.odd[of_lot] = rays.eight(eight).1 as u8;
         }
-        for traveller in &mut self.travellers {
+        for traveller in &mut self.travellers[..places] {
             traveller.inverse[3] = f32::from_bits(NONE as u32);
         }
     }
