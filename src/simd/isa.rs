@@ -1,6 +1,9 @@
 //! Which instruction sets there are, which this machine has, and how a kernel enters one.
 
 use super::lanes::Simd;
+#[cfg(fuzzing)]
+use super::only;
+#[cfg(not(fuzzing))]
 use super::portable::Portable;
 use crate::error::{Error, Result};
 use std::fmt;
@@ -30,8 +33,17 @@ impl Isa {
         Self::ALL.into_iter().filter(|isa| isa.is_available()).collect()
     }
 
-    /// Whether this machine has it.
+    /// Whether this machine has it, and this build is for it (see `only`).
     pub fn is_available(self) -> bool {
+        #[cfg(fuzzing)]
+        let built = self == only::ISA;
+        #[cfg(not(fuzzing))]
+        let built = true;
+        built && self.is_had()
+    }
+
+    /// Whether this machine has it.
+    fn is_had(self) -> bool {
         match self {
             Self::Portable => true,
             #[cfg(target_arch = "x86_64")]
@@ -45,7 +57,7 @@ impl Isa {
             }
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
-                Self::Avx2.is_available()
+                Self::Avx2.is_had()
                     && is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512bw")
@@ -124,6 +136,14 @@ impl Chosen {
     }
 
     /// Runs a task compiled for it.
+    #[cfg(fuzzing)]
+    #[inline]
+    pub fn run<T: Task>(self, task: T) -> T::Output {
+        task.run::<only::Only>()
+    }
+
+    /// Runs a task compiled for it.
+    #[cfg(not(fuzzing))]
     #[inline]
     pub fn run<T: Task>(self, task: T) -> T::Output {
         match self.0 {
@@ -147,18 +167,19 @@ impl fmt::Debug for Chosen {
 }
 
 /// Out of line as the others are: callers would all compile it anew.
+#[cfg(not(fuzzing))]
 #[inline(never)]
 fn run_portable<T: Task>(task: T) -> T::Output {
     task.run::<Portable>()
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(fuzzing)))]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run::<super::avx2::Avx2>()
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(fuzzing)))]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::avx512::Avx512>()

@@ -16,14 +16,19 @@ mod dense;
 mod eight;
 mod isa;
 mod lanes;
+#[cfg(fuzzing)]
+mod only;
+#[cfg_attr(fuzzing, allow(dead_code))]
 mod portable;
 mod prefetch;
 mod scalar;
 mod sixteen;
 
 #[cfg(target_arch = "x86_64")]
+#[cfg_attr(fuzzing, allow(dead_code))]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
+#[cfg_attr(fuzzing, allow(dead_code))]
 mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod pair;
