@@ -82,6 +82,27 @@ fn json_on_standard_output_is_nothing_but_json() {
 }
 
 #[test]
+fn kernels_can_be_given_rays_in_a_row() {
+    let (_folder, model) = model();
+    let options = ["--engines", "raypack", "--rays", "camera,shadow", "--threads", "1", "--slices"];
+    let run = bench(&model).args(options).args(["--json", "-"]).assert();
+    let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
+    assert_eq!(report["header"]["slices"], true);
+    let rows = report["rows"].as_array().unwrap();
+    let modes = rows.iter().map(|row| row["mode"].as_str().unwrap());
+    let kernels = Kernel::ALL.iter().map(|kernel| kernel.name()).chain(["mixed"]);
+    assert!(modes.eq(kernels.clone().chain(kernels)), "{rows:?}");
+    assert!(
+        rows.iter()
+            .all(|row| row["hits"] == rows[if row["rays"] == "camera" { 0 } else { MODES - 1 }]["hits"])
+    );
+    let run = bench(&model).args(options).assert();
+    run.success().stdout(predicate::str::contains("all kernels are given rays in a row"));
+    let run = bench(&model).args(options).args(["--modes", "tile,auto"]).assert();
+    run.failure().code(1).stderr(predicate::str::contains("--slices: auto takes squares of a picture"));
+}
+
+#[test]
 fn every_accuracy_can_be_raced() {
     let (_folder, model) = model();
     for accuracy in ["fast", "watertight", "exact"] {

@@ -45,6 +45,10 @@ pub struct Args {
     /// does), mixed (what cast does); all of them if none is named
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     modes: Vec<String>,
+    /// Give all of raypack's kernels rays in a row, as cast has them, and not packets that are made beforehand: making them
+    /// counts then (all but auto)
+    #[arg(long, conflicts_with = "builds")]
+    slices: bool,
     /// Race with one thread, and with this many; 0 for all processors
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -128,6 +132,7 @@ fn options(args: &Args) -> Result<Options> {
         hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
         accuracy: args.accuracy.mode()?,
         build: args.build.profile()?.build,
+        slices: args.slices,
     })
 }
 

@@ -102,6 +102,7 @@ fn options(args: &Args) -> Result<Options> {
             hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
             accuracy: args.accuracy.mode()?,
             build: args.build.profile()?.build,
+            slices: false,
         },
     })
 }

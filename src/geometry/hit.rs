@@ -1,5 +1,6 @@
 //! The full record of a closest hit.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// The primitive id of a miss.
@@ -8,7 +9,7 @@ pub const NO_PRIMITIVE: u32 = u32::MAX;
 /// Where a ray meets a triangle; [`Hit::MISS`] where it meets none.
 ///
 /// With the triangle's corners `p0 p1 p2`, the point is `(1 - u - v) p0 + u p1 + v p2`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Hit {
     /// The ray's parameter, in lengths of its direction; infinite for a miss.

@@ -1,5 +1,6 @@
 //! A ray: origin, direction and a closed interval of the parameter `t`.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// The points `origin + t * direction` with `tnear <= t <= tfar`.
@@ -7,7 +8,7 @@ use glam::Vec3;
 /// The direction need not be normalised; `t` is counted in its length. Both ends belong to
 /// the interval. An empty interval (`tnear > tfar`) and a ray with a NaN in it hit nothing.
 /// 32 bytes, in the order that `raypack cast` reads.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {
     /// Where `t` is 0.

@@ -274,13 +274,33 @@ impl Sixteen for F32x16 {
         let b = side_by_side([fours[1], fours[5], fours[9], fours[13]]);
         let c = side_by_side([fours[2], fours[6], fours[10], fours[14]]);
         let d = side_by_side([fours[3], fours[7], fours[11], fours[15]]);
-        let (low_ab, high_ab) = (avx512!(_mm512_unpacklo_ps(a, b)), avx512!(_mm512_unpackhi_ps(a, b)));
-        let (low_cd, high_cd) = (avx512!(_mm512_unpacklo_ps(c, d)), avx512!(_mm512_unpackhi_ps(c, d)));
-        [
-            Self(avx512!(_mm512_shuffle_ps::<0x44>(low_ab, low_cd))),
-            Self(avx512!(_mm512_shuffle_ps::<0xee>(low_ab, low_cd))),
-            Self(avx512!(_mm512_shuffle_ps::<0x44>(high_ab, high_cd))),
-            Self(avx512!(_mm512_shuffle_ps::<0xee>(high_ab, high_cd))),
-        ]
+        let [a, b, c, d] = turn_quarters([a, b, c, d]);
+        [Self(a), Self(b), Self(c), Self(d)]
     }
+    #[inline(always)]
+    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16] {
+        let [a, b, c, d] = columns;
+        let rows = turn_quarters([a.0, b.0, c.0, d.0]);
+        let mut fours = [[0.0; 4]; 16];
+        for (i, row) in rows.into_iter().enumerate() {
+            let row = Self(row).store();
+            for quarter in 0..4 {
+                fours[4 * quarter + i].copy_from_slice(&row[4 * quarter..][..4]);
+            }
+        }
+        fours
+    }
+}
+
+/// Rows and columns exchanged in each quarter.
+#[inline(always)]
+fn turn_quarters([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    let (low_ab, high_ab) = (avx512!(_mm512_unpacklo_ps(a, b)), avx512!(_mm512_unpackhi_ps(a, b)));
+    let (low_cd, high_cd) = (avx512!(_mm512_unpacklo_ps(c, d)), avx512!(_mm512_unpackhi_ps(c, d)));
+    [
+        avx512!(_mm512_shuffle_ps::<0x44>(low_ab, low_cd)),
+        avx512!(_mm512_shuffle_ps::<0xee>(low_ab, low_cd)),
+        avx512!(_mm512_shuffle_ps::<0x44>(high_ab, high_cd)),
+        avx512!(_mm512_shuffle_ps::<0xee>(high_ab, high_cd)),
+    ]
 }

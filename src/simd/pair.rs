@@ -159,6 +159,19 @@ impl<L: Eight> Sixteen for Pair<L> {
         let [e, f, g, h] = half_of_fours::<L>(fours, 8);
         [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
     }
+    #[inline(always)]
+    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16] {
+        let [a, b, c, d] = columns;
+        let mut fours = [[0.0; 4]; 16];
+        for (half, columns) in [[a.0, b.0, c.0, d.0], [a.1, b.1, c.1, d.1]].into_iter().enumerate() {
+            for (i, pair) in L::transpose_fours(columns).into_iter().enumerate() {
+                let pair = pair.store();
+                fours[8 * half + i].copy_from_slice(&pair[..4]);
+                fours[8 * half + i + 4].copy_from_slice(&pair[4..]);
+            }
+        }
+        fours
+    }
 }
 
 /// [`Sixteen::of_fours`] of the eight from `first` on.

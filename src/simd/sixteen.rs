@@ -16,6 +16,19 @@ pub trait Sixteen: Lanes<16> {
         [Self::load(&columns[0]), Self::load(&columns[1]), Self::load(&columns[2]), Self::load(&columns[3])]
     }
 
+    /// The same back: number `i` of four `j` is lane `j` of vector `i`.
+    #[inline(always)]
+    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16] {
+        let columns = [columns[0].store(), columns[1].store(), columns[2].store(), columns[3].store()];
+        let mut fours = [[0.0; 4]; 16];
+        for lane in 0..16 {
+            for i in 0..4 {
+                fours[lane][i] = columns[i][lane];
+            }
+        }
+        fours
+    }
+
     /// Lane `i` is `ids[i]`.
     fn ids_load(ids: &[i32; 16]) -> Self::Ids;
 

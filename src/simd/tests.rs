@@ -121,7 +121,9 @@ fn check_sixteen<L: Sixteen>() {
     for j in 0..16 {
         scattered[j] = &fours[(j * 5) & 15];
     }
-    for (i, column) in L::of_fours(&scattered).into_iter().enumerate() {
+    let columns = L::of_fours(&scattered);
+    assert_eq!(L::fours(&columns), scattered.map(|four| *four));
+    for (i, column) in columns.into_iter().enumerate() {
         let column = column.store();
         for j in 0..16 {
             assert_eq!(column[j], fours[(j * 5) & 15][i], "number {i} of record {j}");

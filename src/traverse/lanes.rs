@@ -38,22 +38,6 @@ impl<const W: usize> RayPacket<W> {
         packet
     }
 
-    /// Puts rays into as many packets as they fill, and says of each which lanes hold one; how many packets these are.
-    /// Panics if there are more rays than `packets` or `active` have room for.
-    pub(crate) fn fill(rays: &[Ray], packets: &mut [Self], active: &mut [u32]) -> usize {
-        let count = rays.len().div_ceil(W);
-        let places = packets[..count].iter_mut().zip(&mut active[..count]);
-        for (rays, (packet, active)) in rays.chunks(W).zip(places) {
-            if let Some(rays) = rays.first_chunk::<W>() {
-                rays.iter().enumerate().for_each(|(lane, ray)| packet.set(lane, ray));
-            } else {
-                *packet = Self::of_slice(rays);
-            }
-            *active = lanes_of(rays.len());
-        }
-        count
-    }
-
     /// Puts a ray into a lane. Panics if there is no such lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, ray: &Ray) {

@@ -70,9 +70,9 @@ impl Accel {
         let mut found = [const { [const { HitPacket::miss() }; PACKETS] }; K];
         let found = found.as_flattened_mut();
         for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
-            let (packets, active) = squares.fill(rays);
+            let (packets, active) = squares.fill(self, rays);
             self.intersect_tile(packets, active, &mut found[..packets.len()]);
-            HitPacket::give(found, hits);
+            self.unpack(found, hits);
         }
     }
 
@@ -80,7 +80,7 @@ impl Accel {
         let mut squares = Squares::<1>::new();
         let mut found = [0; PACKETS];
         for (rays, occluded) in rays.chunks(PACKETS * 16).zip(occluded.chunks_mut(PACKETS * 16)) {
-            let (packets, active) = squares.fill(rays);
+            let (packets, active) = squares.fill(self, rays);
             self.occluded_tile(packets, active, &mut found[..packets.len()]);
             give_lanes::<16>(&found, occluded);
         }
@@ -100,9 +100,9 @@ impl<const K: usize> Squares<K> {
     }
 
     /// Takes up rays, no more than there is room for, and gives the packets that they fill, with their lanes.
-    fn fill(&mut self, rays: &[Ray]) -> (&[RayPacket<16>], &[u32]) {
+    fn fill(&mut self, accel: &Accel, rays: &[Ray]) -> (&[RayPacket<16>], &[u32]) {
         let (packets, active) = (self.packets.as_flattened_mut(), self.active.as_flattened_mut());
-        let count = RayPacket::fill(rays, packets, active);
+        let count = accel.pack(rays, packets, active);
         (&packets[..count], &active[..count])
     }
 }

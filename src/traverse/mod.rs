@@ -18,6 +18,7 @@ mod filter;
 mod kernel;
 mod lanes;
 mod many;
+mod pack;
 mod packet;
 mod query;
 mod range;

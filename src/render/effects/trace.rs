@@ -49,8 +49,8 @@ impl Default for Packets {
 
 impl Packets {
     /// Takes up at most a lot of rays, and says how many packets they fill.
-    fn fill(&mut self, rays: &[Ray]) -> usize {
-        RayPacket::fill(rays, &mut self.rays, &mut self.active)
+    fn fill(&mut self, accel: &Accel, rays: &[Ray]) -> usize {
+        accel.pack(rays, &mut self.rays, &mut self.active)
     }
 }
 
@@ -78,7 +78,7 @@ impl Tracer {
                 let dispatch = &mut self.ways[way as usize];
                 for (rays, hits) in rays.chunks(LOT).zip(hits.chunks_mut(LOT)) {
                     let packets = &mut self.packets;
-                    let count = packets.fill(rays);
+                    let count = packets.fill(accel, rays);
                     let found = &mut packets.hits[..count];
                     dispatch.intersect(
                         accel,
@@ -87,7 +87,7 @@ impl Tracer {
                         &packets.active[..count],
                         found,
                     );
-                    HitPacket::give(found, hits);
+                    accel.unpack(found, hits);
                 }
             }
             (kernel, _) => accel.intersect_many(kernel, rays, hits),
@@ -118,7 +118,7 @@ impl Tracer {
             };
             for (rays, found) in rays.chunks(LOT).zip(self.found.chunks_mut(LOT)) {
                 let packets = &mut self.packets;
-                let count = packets.fill(rays);
+                let count = packets.fill(accel, rays);
                 let lanes = &mut packets.occluded[..count];
                 dispatch.occluded(
                     accel,

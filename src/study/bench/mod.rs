@@ -8,7 +8,8 @@
 //!
 //! What each engine is given:
 //!
-//! - raypack: rays for its single-ray kernel, its own packets for the others.
+//! - raypack: rays for its single-ray, stream and filter kernels, its own packets for the others; or, if that is asked for,
+//!   rays for all ([`Options::slices`]).
 //! - Embree: its own packets. Every width, flag and build is a mode of its own; denormals are flushed.
 //! - obvhs: its own rays with their inverse directions, its triangles in the tree's order.
 //!
@@ -112,6 +113,9 @@ pub struct Options {
     pub accuracy: Accuracy,
     /// How raypack's tree is built.
     pub build: BuildParams,
+    /// Whether every kernel is given rays in a row, as `raypack cast` has them, and makes packets of them while the clock
+    /// runs.
+    pub slices: bool,
 }
 
 /// Measures. `progress` is told, a line at a time, what is about to happen.
@@ -122,7 +126,8 @@ pub struct Options {
 pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Report> {
     check(options)?;
     progress("building raypack's tree");
-    let ours = Ours::new(mesh, &options.build, options.isa, options.accuracy)?;
+    let mut ours = Ours::new(mesh, &options.build, options.isa, options.accuracy)?;
+    ours.give_slices(options.slices);
     let mut notes = Vec::new();
     let mut peers: Vec<(EngineName, Box<dyn Engine>)> = Vec::new();
     for &name in options.engines.iter().filter(|&&name| name != EngineName::Raypack) {
@@ -166,6 +171,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             seed: options.seed,
             camera: setup.camera.to_string(),
             size: options.size,
+            slices: options.slices,
             light: setup.light.to_array(),
         },
         rows: Vec::new(),
@@ -198,6 +204,12 @@ fn check(options: &Options) -> Result<()> {
         Kernel::ALL.iter().map(|kernel| kernel.name()).chain([ours::AUTO, ours::MIXED]).collect();
     if let Some(mode) = options.modes.iter().find(|mode| !known.contains(&mode.as_str())) {
         return Err(Error::option("--modes", format!("\"{mode}\" is not one of {}", known.join(", "))));
+    }
+    if options.slices && options.modes.iter().any(|mode| mode == ours::AUTO) {
+        return Err(Error::option(
+            "--slices",
+            "auto takes squares of a picture, not rays in a row; name mixed",
+        ));
     }
     if options.kinds.is_empty() {
         return Err(Error::option("--rays", "no kind of ray is named"));

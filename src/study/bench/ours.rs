@@ -1,8 +1,8 @@
 //! raypack as an engine: a mode for every kernel, `auto`, which chooses among those for pictures as it goes, and
 //! `mixed`, which chooses among those for slices of rays.
 //!
-//! The single-ray and the stream kernel are given rays, the packet kernels packets, each made before the clock starts; the
-//! records go out in the kernel's own form.
+//! The single-ray, the stream and the filter kernel are given rays, the packet kernels packets, each made before the clock
+//! starts; the records go out in the kernel's own form. Or all are given rays in a row ([`Ours::give_slices`]).
 
 use super::engine::{Contender, Engine, Lot, Results, collect};
 use super::report::Beams;
@@ -25,6 +25,7 @@ pub struct Ours {
     accel: Accel,
     build_seconds: f64,
     stats: TreeStats,
+    slices: bool,
 }
 
 impl Ours {
@@ -42,7 +43,12 @@ impl Ours {
     /// The same with a tree that has been built, in so many seconds.
     pub fn of_accel(accel: Accel, build_seconds: f64) -> Self {
         let stats = accel.stats();
-        Self { accel, build_seconds, stats }
+        Self { accel, build_seconds, stats, slices: false }
+    }
+
+    /// Whether all kernels are given rays in a row, and give records ray by ray.
+    pub fn give_slices(&mut self, slices: bool) {
+        self.slices = slices;
     }
 
     /// Seconds that the build took.
@@ -164,20 +170,22 @@ impl Engine for Ours {
     }
 
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
+        let sliced = |way| -> Box<dyn Contender + 'a> {
+            Box::new(SliceRun { engine: self, way, lots: slices(rays, any_hit) })
+        };
         let contender = |kernel| match kernel {
-            Kernel::Single | Kernel::Stream | Kernel::Filter => {
-                Box::new(SliceRun { engine: self, way: Way::Named(kernel), lots: slices(rays, any_hit) })
-                    as Box<dyn Contender + 'a>
-            }
+            _ if self.slices => sliced(Way::Named(kernel)),
+            Kernel::Single | Kernel::Stream | Kernel::Filter => sliced(Way::Named(kernel)),
             Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
             Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
             Kernel::Packet16 => self.packets::<16>(kernel, rays, any_hit),
             Kernel::Tile | Kernel::WideTile => self.tiles(kernel, rays, any_hit),
         };
-        let mixed =
-            SliceRun { engine: self, way: Way::Mixed(DispatchPool::default()), lots: slices(rays, any_hit) };
-        let chosen: [Box<dyn Contender + 'a>; 2] = [self.auto(rays, any_hit), Box::new(mixed)];
-        Kernel::ALL.into_iter().map(contender).chain(chosen).collect()
+        let mixed = sliced(Way::Mixed(DispatchPool::default()));
+        let kernels = Kernel::ALL.into_iter().map(contender);
+        // Squares of a picture are packets.
+        let auto = (!self.slices).then(|| self.auto(rays, any_hit));
+        kernels.chain(auto).chain([mixed]).collect()
     }
 }
 

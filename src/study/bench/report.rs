@@ -50,6 +50,8 @@ pub struct Header {
     pub camera: String,
     /// Width and height of the camera's image.
     pub size: u32,
+    /// Whether all of raypack's kernels were given rays in a row.
+    pub slices: bool,
     /// The point light.
     pub light: [f32; 3],
 }

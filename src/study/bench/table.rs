@@ -18,7 +18,8 @@ impl fmt::Display for Report {
             h.engines.iter().map(|e| format!("{} {} ({})", e.name, e.version, e.isa)).collect();
         writeln!(f, "{}, {}", engines.join(", "), h.date)?;
         if h.engines.iter().any(|e| e.name == "raypack") {
-            writeln!(f, "raypack's accuracy: {}", h.accuracy)?;
+            let given = if h.slices { "; all kernels are given rays in a row" } else { "" };
+            writeln!(f, "raypack's accuracy: {}{given}", h.accuracy)?;
         }
         writeln!(f, "\nMillion rays a second, median of the rounds; the best mode of each engine\n")?;
         write!(f, "{}", grid(&self.summary()))?;
