@@ -16,13 +16,22 @@ mod best {
     pub const ISA: super::Isa = super::Isa::Avx512;
 }
 
-#[cfg(all(target_feature = "avx2", target_feature = "fma", not(target_feature = "avx512f")))]
+#[cfg(all(
+    target_feature = "avx2",
+    target_feature = "fma",
+    not(all(
+        target_feature = "avx512f",
+        target_feature = "avx512vl",
+        target_feature = "avx512bw",
+        target_feature = "avx512dq"
+    ))
+))]
 mod best {
     pub use crate::simd::avx2::Avx2 as Only;
     pub const ISA: super::Isa = super::Isa::Avx2;
 }
 
-#[cfg(not(target_feature = "avx2"))]
+#[cfg(not(all(target_feature = "avx2", target_feature = "fma")))]
 mod best {
     pub use crate::simd::portable::Portable as Only;
     pub const ISA: super::Isa = super::Isa::Portable;
