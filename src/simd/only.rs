@@ -5,26 +5,16 @@
 
 use super::isa::Isa;
 
-#[cfg(all(
-    target_feature = "avx512f",
-    target_feature = "avx512vl",
-    target_feature = "avx512bw",
-    target_feature = "avx512dq"
-))]
+// Each of the three has AVX-512 F with it.
+#[cfg(all(target_feature = "avx512vl", target_feature = "avx512bw", target_feature = "avx512dq"))]
 mod best {
     pub use crate::simd::avx512::Avx512 as Only;
     pub const ISA: super::Isa = super::Isa::Avx512;
 }
 
 #[cfg(all(
-    target_feature = "avx2",
-    target_feature = "fma",
-    not(all(
-        target_feature = "avx512f",
-        target_feature = "avx512vl",
-        target_feature = "avx512bw",
-        target_feature = "avx512dq"
-    ))
+    all(target_feature = "avx2", target_feature = "fma"),
+    not(all(target_feature = "avx512vl", target_feature = "avx512bw", target_feature = "avx512dq"))
 ))]
 mod best {
     pub use crate::simd::avx2::Avx2 as Only;

@@ -26,9 +26,7 @@ impl Accel {
     /// Gives the hits of packets one by one, as many as there is room for.
     pub(crate) fn unpack(&self, packets: &[HitPacket<16>], hits: &mut [Hit]) {
         let (full, rest) = hits.as_chunks_mut::<16>();
-        if let Some(last) = packets.get(full.len()) {
-            rest.iter_mut().enumerate().for_each(|(lane, hit)| *hit = last.get(lane));
-        }
+        HitPacket::give(packets.get(full.len()..).unwrap_or_default(), rest);
         self.chosen().run(Unpack { packets, hits: full });
     }
 }
