@@ -288,8 +288,8 @@ impl Accel {
             let count = 2 * rays.len();
             PacketWidth::intersect(self, &halves[..count], &lanes[..count], &mut found[..count]);
             for (hits, [first, second]) in hits.iter_mut().zip(found.as_chunks().0) {
-                hits.set_part(0, first);
-                hits.set_part(1, second);
+                hits.set_part(0, first, lanes_of(8));
+                hits.set_part(1, second, lanes_of(8));
             }
         }
     }
@@ -330,7 +330,7 @@ impl Accel {
         }
     }
 
-    /// The closest hits of the lanes that are `left` of up to sixteen packets; misses in packets without any `lanes`.
+    /// The closest hits of the lanes that are `left` of up to sixteen packets; misses in those that are not in `lanes`.
     fn intersect_square(
         &self,
         rays: &[RayPacket<16>],
@@ -341,11 +341,19 @@ impl Accel {
         if left != [0; PACKETS] {
             [left] = self.ask(IntersectTile { rays, active: &[left], hits: &mut *hits });
         }
-        for (((rays, active), left), hits) in rays.iter().zip(lanes).zip(left).zip(hits) {
-            if *active == 0 {
+        for (((rays, &active), left), hits) in rays.iter().zip(lanes).zip(left).zip(hits) {
+            if active == 0 {
                 *hits = HitPacket::miss();
-            } else if left != 0 {
+            } else if left == active {
                 *hits = self.intersect_packet(rays, left);
+            } else {
+                // Beams have written the lanes that were part of them, and no others.
+                if left != 0 {
+                    hits.set_part(0, &self.intersect_packet(rays, left), left);
+                }
+                if active != lanes_of(16) {
+                    hits.set_part(0, &HitPacket::<16>::miss(), lanes_of(16) & !active);
+                }
             }
         }
     }
@@ -369,14 +377,13 @@ impl Accel {
     pub fn occluded_tile(&self, rays: &[RayPacket<16>], active: &[u32], occluded: &mut [u32]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         let lanes = tile_lanes::<WIDE>(rays, active);
+        occluded.fill(0);
         let squares = rays.chunks(PACKETS).zip(occluded.chunks_mut(PACKETS));
         for ((rays, occluded), lanes) in squares.zip(&lanes) {
             let left = self.ask(OccludedTile { rays, active: lanes, found: &mut *occluded });
-            for (((rays, active), left), occluded) in rays.iter().zip(lanes).zip(left).zip(occluded) {
-                if *active == 0 {
-                    *occluded = 0;
-                } else if left != 0 {
-                    *occluded = self.occluded_packet(rays, left);
+            for ((rays, left), occluded) in rays.iter().zip(left).zip(occluded) {
+                if left != 0 {
+                    *occluded |= self.occluded_packet(rays, left);
                 }
             }
         }

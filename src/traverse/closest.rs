@@ -4,13 +4,38 @@ use super::lanes::HitPacket;
 use super::records::Records;
 use crate::geometry::NO_PRIMITIVE;
 use crate::geometry::triangle::{self, Candidate, Mode, Test};
+use crate::kdtree::Tree;
 use crate::simd::{Lanes, Mask};
+use glam::Vec3;
 
 /// The id of no triangle yet: greater than any, so that equal `t` lets the first hit in.
 pub const NONE: i32 = i32::MAX;
 
 /// A hit's id as the library gives it.
 const _: () = assert!(NO_PRIMITIVE > NONE as u32);
+
+/// Normals of triangles, one after the other: neighbouring packets mostly hit the same, so that the last one is remembered.
+pub struct Normals {
+    primitive: u32,
+    normal: Vec3,
+}
+
+impl Normals {
+    /// None so far.
+    #[inline(always)]
+    pub const fn new() -> Self {
+        Self { primitive: NO_PRIMITIVE, normal: Vec3::ZERO }
+    }
+
+    /// The normal of a triangle that was entered.
+    #[inline(always)]
+    fn of<T: Tree>(&mut self, tree: &T, primitive: u32) -> Vec3 {
+        if primitive != self.primitive {
+            *self = Self { primitive, normal: triangle::normal(tree.corners(primitive)) };
+        }
+        self.normal
+    }
+}
 
 /// The closest hits of `W` rays so far; with any hit, which of them are done.
 #[derive(Clone, Copy)]
@@ -85,7 +110,12 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     /// Hit records, with what belongs to the triangles filled in. If weights were not kept, `test` finds
     /// them again.
     #[inline(always)]
-    pub fn records<T: Records<M>, M: Mode>(&self, tree: &T, test: Option<&M::Test<W, L>>) -> HitPacket<W> {
+    pub fn records<T: Records<M>, M: Mode>(
+        &self,
+        tree: &T,
+        test: Option<&M::Test<W, L>>,
+        normals: &mut Normals,
+    ) -> HitPacket<W> {
         let found = L::ids_less(self.primitive, L::ids(NONE));
         let ids = L::ids_store(L::ids_select(found, self.primitive, L::ids(NO_PRIMITIVE as i32)));
         let zero = L::splat(0.0);
@@ -107,7 +137,7 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
                 }
                 None => M::Test::<W, L>::weights(record, self.u, self.v),
             };
-            let along = triangle::normal(tree.corners(id as u32));
+            let along = normals.of(tree, id as u32);
             u = L::select(lanes, weights[0], u);
             v = L::select(lanes, weights[1], v);
             for axis in 0..3 {

@@ -140,15 +140,33 @@ impl<const W: usize> HitPacket<W> {
         }
     }
 
-    /// Puts `N` hits into the lanes from `part * N` on. Panics if there are not as many.
+    /// Puts those of `N` hits whose bit is set in `lanes` into the lanes from `part * N` on. Panics if there are not as many.
     #[inline(always)]
-    pub(super) fn set_part<const N: usize>(&mut self, part: usize, hits: &HitPacket<N>) {
-        self.t.as_chunks_mut::<N>().0[part] = hits.t;
-        self.u.as_chunks_mut::<N>().0[part] = hits.u;
-        self.v.as_chunks_mut::<N>().0[part] = hits.v;
-        self.primitive.as_chunks_mut::<N>().0[part] = hits.primitive;
+    pub(super) fn set_part<const N: usize>(&mut self, part: usize, hits: &HitPacket<N>, lanes: u32) {
+        if lanes == lanes_of(N) {
+            self.t.as_chunks_mut::<N>().0[part] = hits.t;
+            self.u.as_chunks_mut::<N>().0[part] = hits.u;
+            self.v.as_chunks_mut::<N>().0[part] = hits.v;
+            self.primitive.as_chunks_mut::<N>().0[part] = hits.primitive;
+            for axis in 0..3 {
+                self.normal[axis].as_chunks_mut::<N>().0[part] = hits.normal[axis];
+            }
+        } else {
+            for lane in (0..N).filter(|lane| lanes >> lane & 1 == 1) {
+                self.set(part * N + lane, &hits.get(lane));
+            }
+        }
+    }
+
+    /// Puts a hit into a lane. Panics if there is no such lane.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, hit: &Hit) {
+        self.t[lane] = hit.t;
+        self.u[lane] = hit.u;
+        self.v[lane] = hit.v;
+        self.primitive[lane] = hit.primitive;
         for axis in 0..3 {
-            self.normal[axis].as_chunks_mut::<N>().0[part] = hits.normal[axis];
+            self.normal[axis][lane] = hit.normal[axis];
         }
     }
 }

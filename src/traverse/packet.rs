@@ -10,7 +10,7 @@
 //!
 //! With `W = 1` and plain floats this is the single-ray kernel.
 
-use super::closest::Closest;
+use super::closest::{Closest, Normals};
 use super::lanes::{HitPacket, RayPacket};
 use super::range::{adapt, is_ordinary};
 use super::records::Records;
@@ -37,7 +37,8 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode>(
 ) -> HitPacket<W> {
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
-    let mut hits = walk::<W, L, T, M, false>(tree, traced, active).records::<T, M>(tree, None);
+    let mut hits =
+        walk::<W, L, T, M, false>(tree, traced, active).records::<T, M>(tree, None, &mut Normals::new());
     if let Some(adapted) = adapted {
         adapted.undo(rays, &mut hits, tree);
     }

@@ -113,7 +113,7 @@ where
     }
 }
 
-/// The closest hits of `K` squares' packets that are part of a beam; the lanes of the others.
+/// The closest hits of the lanes of `K` squares' packets that are part of a beam; the other lanes.
 pub struct IntersectTile<'a, const K: usize> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [[u32; PACKETS]; K],
@@ -130,7 +130,7 @@ impl<const K: usize> Query for IntersectTile<'_, K> {
     }
 }
 
-/// The lanes of a tile that hit anything, in the packets that are part of a beam; the lanes of the others.
+/// The lanes of a tile that hit anything, of those that are part of a beam, added to `found`; the other lanes.
 pub struct OccludedTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],
@@ -147,7 +147,7 @@ impl Query for OccludedTile<'_> {
     }
 }
 
-/// What the tile kernel does with a tile; the lanes of the packets that are part of no beam.
+/// What the tile kernel does with a tile; the lanes that are part of no beam.
 pub struct CountTile<'a> {
     pub rays: &'a [RayPacket<16>],
     pub active: &'a [u32; PACKETS],

@@ -89,7 +89,7 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     type Kept = ();
 
     #[inline(always)]
-    fn keep(_direction: &Lanes3<L>, _axis: usize) {}
+    fn keep(_slopes: [L; 2], _along: L) {}
 
     #[inline(always)]
     fn revive(_kept: &(), apex: &[f32; 3], direction: &Lanes3<L>, _axis: usize) -> Self {

@@ -20,8 +20,9 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// Prepares `W` rays. `active` has a bit for each lane that matters.
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
 
-    /// What to keep of rays whose directions are greatest along `axis`.
-    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept;
+    /// What to keep of rays whose directions are greatest along an axis: `along` is what they are there, and `slopes` are
+    /// the quotients of the other two, renamed as [`RENAMED`](super::RENAMED) says, and `along`.
+    fn keep(slopes: [L; 2], along: L) -> Self::Kept;
 
     /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept.
     fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self;

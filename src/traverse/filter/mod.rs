@@ -27,7 +27,7 @@ mod lists;
 mod lot;
 mod source;
 
-use super::closest::Closest;
+use super::closest::{Closest, Normals};
 use super::records::Resident;
 use super::stream::{self, Answers};
 use super::walk::load3;
@@ -63,7 +63,7 @@ impl ByEights for stream::Closest<'_> {
     ) {
         let (rays, _) = rays.eight(eight);
         let test = M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), closest.found());
-        let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test));
+        let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test), &mut Normals::new());
         for (lane, hit) in self.0[8 * eight..].iter_mut().take(8).enumerate() {
             *hit = found.get(lane);
         }

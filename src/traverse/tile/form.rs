@@ -30,6 +30,17 @@ const MISFITS: u32 = 12;
 /// The least squared sine of an angle between two rays that tells where they meet.
 const NARROWEST: f64 = 1e-12;
 
+/// The slopes of rays from a beam's apex, along the first of the frame's axes and along the second, packet by packet of
+/// each of `K` squares. Those of lanes that do not belong to it may be anything.
+#[repr(C, align(64))]
+pub struct Slopes<const K: usize>(pub [[[[f32; 16]; PACKETS]; 2]; K]);
+
+impl<const K: usize> Slopes<K> {
+    pub const fn new() -> Self {
+        Self([[[[0.0; 16]; PACKETS]; 2]; K])
+    }
+}
+
 /// What the first two coordinates of rays are in the beam's window, and their depths.
 #[derive(Clone)]
 #[repr(C, align(64))]
@@ -111,19 +122,22 @@ fn meeting(rays: &[RayPacket<16>], active: &[u32], first: usize) -> Option<[f32;
     found
 }
 
-/// The packets' extents, square by square, if the rays are a beam from its apex. A packet does not belong to it if origins differ,
-/// directions point too far apart, or a ray is not an ordinary one or reaches behind its origin: it is taken out of
-/// `active`. `None` if there are more than [`MISFITS`] of these for each square.
+/// The packets' extents, square by square, and their rays' slopes, if the rays are a beam from its apex. What does not belong to
+/// it is taken out of `active`: rays that do not run fastest along the frame's axis, and whole packets in which another ray has
+/// another origin, is not an ordinary one, or reaches behind its origin. `None` if there are more than [`MISFITS`] packets for
+/// each square of which nothing belongs.
 #[inline(always)]
 pub fn from_apex<L: Sixteen, const K: usize>(
     frame: &Frame,
     rays: &[RayPacket<16>],
     active: &mut [[u32; PACKETS]; K],
+    slopes: &mut Slopes<K>,
 ) -> Option<[Extent<L>; K]> {
     let mut extents = [Extent::none(); K];
     let mut misfits = 0;
-    for ((rays, active), extent) in rays.chunks(PACKETS).zip(active).zip(&mut extents) {
-        *extent = square_from_apex(frame, rays, active, &mut misfits, MISFITS * K as u32)?;
+    let squares = rays.chunks(PACKETS).zip(active).zip(&mut slopes.0);
+    for (((rays, active), slopes), extent) in squares.zip(&mut extents) {
+        *extent = square_from_apex(frame, rays, active, slopes, &mut misfits, MISFITS * K as u32)?;
     }
     Some(extents)
 }
@@ -134,34 +148,34 @@ fn square_from_apex<L: Sixteen>(
     frame: &Frame,
     rays: &[RayPacket<16>],
     active: &mut [u32; PACKETS],
+    slopes: &mut [[[f32; 16]; PACKETS]; 2],
     misfits: &mut u32,
     most: u32,
 ) -> Option<Extent<L>> {
     let (zero, endless) = (L::splat(0.0), L::splat(f32::INFINITY));
-    let mut places = [[[0.0; 16]; PACKETS]; 2];
     let (mut nearest, mut farthest) = ([0.0; PACKETS], [f32::INFINITY; PACKETS]);
     for (packet, rays) in rays.iter().enumerate() {
-        let lanes = active[packet];
-        if lanes == 0 {
+        if active[packet] == 0 {
             continue;
         }
         let axis = frame.axes[2];
         let forward = L::load(&rays.direction[axis]) * L::splat(frame.sign);
         let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
-        let mut belongs = ordinary(forward, tnear, tfar);
+        let mut fits = ordinary(forward, tnear, tfar);
         for axis in 0..3 {
-            belongs = belongs & L::load(&rays.origin[axis]).eq(L::splat(frame.apex[axis]));
+            fits = fits & L::load(&rays.origin[axis]).eq(L::splat(frame.apex[axis]));
         }
-        let slopes = [
+        let slope = [
             L::load(&rays.direction[frame.axes[0]]) / forward,
             L::load(&rays.direction[frame.axes[1]]) / forward,
         ];
-        belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
-        if belongs.bits() & lanes != lanes {
-            leave_out(&mut active[packet], misfits, most)?;
+        let lanes = belonging(active[packet], fits.bits(), are_flat(&slope).bits());
+        active[packet] = lanes;
+        if lanes == 0 {
+            left_out(misfits, most)?;
             continue;
         }
-        (places[0][packet], places[1][packet]) = (slopes[0].store(), slopes[1].store());
+        (slopes[0][packet], slopes[1][packet]) = (slope[0].store(), slope[1].store());
         // Rays from a camera mostly have no ends of their own.
         let endless = tnear.eq(zero) & tfar.eq(endless);
         if endless.bits() & lanes != lanes {
@@ -173,12 +187,13 @@ fn square_from_apex<L: Sixteen>(
             (nearest[packet], farthest[packet]) = (f32::INFINITY, f32::NEG_INFINITY);
         }
     }
-    let (low, high) = rectangles::<L>(&places, active);
+    let (low, high) = rectangles::<L>(slopes, active);
     Some(extent(low, high, L::load(&nearest), L::load(&farthest), 0.0))
 }
 
 /// The packets' extents, what each ray looks like, and how far rays are off, if they are a beam of some
-/// form. Packets that do not belong to it are taken out of `active`; `None` if there are more than [`MISFITS`].
+/// form. What does not belong to it is taken out of `active`, as by [`from_apex`]; `None` if there are more than [`MISFITS`]
+/// packets of which nothing does.
 #[inline(always)]
 pub fn of_form<L: Sixteen>(
     form: Form,
@@ -209,34 +224,35 @@ pub fn of_form<L: Sixteen>(
         ];
         let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
         let forward = if form == Form::Toward { zero - d[2] } else { d[2] };
-        let mut belongs = ordinary(forward, tnear, tfar);
+        let mut fits = ordinary(forward, tnear, tfar);
         let slopes = if form == Form::Along { along } else { [d[0] / d[2], d[1] / d[2]] };
-        belongs = belongs & slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0));
 
         let (start, end) = (o[2] + d[2] * tnear, o[2] + d[2] * tfar);
         let crossing = [o[0] - slopes[0] * o[2], o[1] - slopes[1] * o[2]];
         let (near, far) = if form == Form::Toward { (end, start) } else { (start, end) };
         match form {
             Form::From => {
-                belongs = belongs & o[0].eq(zero) & o[1].eq(zero) & o[2].eq(zero);
+                fits = fits & o[0].eq(zero) & o[1].eq(zero) & o[2].eq(zero);
             }
             Form::Toward => {
                 let stray = o[2] * L::splat(STRAY) + L::splat(place * STRAY_OF_PLACE);
-                belongs = belongs & crossing[0].abs().le(stray) & crossing[1].abs().le(stray);
-                belongs = belongs & (zero - stray).le(near);
+                fits = fits & crossing[0].abs().le(stray) & crossing[1].abs().le(stray);
+                fits = fits & (zero - stray).le(near);
             }
             Form::Along => {
                 let lane = lanes.trailing_zeros() as usize & 15;
                 let first = *first_direction.get_or_insert_with(|| direction(rays, lane));
                 for axis in 0..3 {
-                    belongs = belongs & L::load(&rays.direction[axis]).eq(L::splat(first[axis]));
+                    fits = fits & L::load(&rays.direction[axis]).eq(L::splat(first[axis]));
                     // Nothing else asks where they start.
-                    belongs = belongs & o[axis].abs().le(L::splat(f32::MAX));
+                    fits = fits & o[axis].abs().le(L::splat(f32::MAX));
                 }
             }
         }
-        if belongs.bits() & lanes != lanes {
-            leave_out(&mut active[packet], &mut misfits, MISFITS)?;
+        let lanes = belonging(lanes, fits.bits(), are_flat(&slopes).bits());
+        active[packet] = lanes;
+        if lanes == 0 {
+            left_out(&mut misfits, MISFITS)?;
             continue;
         }
         let counts = L::mask_from_bits(lanes);
@@ -256,10 +272,23 @@ pub fn of_form<L: Sixteen>(
     Some((extent(low, high, nearest, farthest, range), Spread { range, stray }))
 }
 
-/// Takes a packet out that does not belong. `None` if there are more than `most`.
+/// The lanes of a packet that belong to a beam: those that run fastest along its axis, if all of these fit. (If one of them
+/// does not, its packet's rays have less in common than it takes, and all of them stay out.)
 #[inline(always)]
-fn leave_out(lanes: &mut u32, misfits: &mut u32, most: u32) -> Option<()> {
-    *lanes = 0;
+fn belonging(lanes: u32, fits: u32, flat: u32) -> u32 {
+    let flat = lanes & flat;
+    if flat & !fits == 0 { flat } else { 0 }
+}
+
+/// The lanes that run fastest along the axis that slopes are relative to.
+#[inline(always)]
+fn are_flat<L: Sixteen>(slopes: &[L; 2]) -> L::Mask {
+    slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0))
+}
+
+/// One more packet of which nothing belongs. `None` if there are more than `most`.
+#[inline(always)]
+fn left_out(misfits: &mut u32, most: u32) -> Option<()> {
     *misfits += 1;
     (*misfits <= most).then_some(())
 }

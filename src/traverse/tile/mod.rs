@@ -6,8 +6,8 @@
 //! 2005; interval traversal: Boulos, Wald & Benthin 2008). In order:
 //!
 //! 1. `form`: the rays are made a beam (`beam`); that decides whether they are alike enough at all.
-//!    They are if they part from one point, run toward one, or are parallel. Packets that point elsewhere than the
-//!    others make another beam.
+//!    They are if they part from one point, run toward one, or are parallel. Rays that run fastest along another axis
+//!    make another beam: a packet may be part of two.
 //! 2. `page`: the beam descends the *upper tree*, whose leaves are pages of some fifty triangles, near
 //!    cells first.
 //! 3. `outline`: of a page's triangles, sixteen at a time, those that no ray can hit are culled: first
@@ -36,13 +36,14 @@ mod shadow;
 pub use beam::{PACKETS, WIDE};
 pub use probe::{Probe, TileCounts};
 
+use super::closest::Normals;
 use super::lanes::{HitPacket, RayPacket};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
 use crate::simd::{Lanes, Simd, Sixteen};
 use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
-use form::{Form, Seen};
+use form::{Form, Seen, Slopes};
 use nearest::Nearest;
 use page::Descent;
 use shadow::Shadows;
@@ -53,9 +54,8 @@ const FEW: u32 = 1;
 /// A tile may be so many beams, one after the other: where a light is near, its rays run fastest along different axes.
 const BEAMS: usize = 3;
 
-/// The closest hits of the lanes in `active` of up to `K` squares of sixteen packets; the others come out as misses. Gives
-/// the lanes of packets that are part of no beam from one point: for them, and for packets of which no lane is active,
-/// nothing is done. `K` is 1, or [`WIDE`].
+/// The closest hits of the lanes in `active` of up to `K` squares of sixteen packets. Gives the lanes that are part of no
+/// beam from one point: for them, and for lanes that are not active, nothing is done. `K` is 1, or [`WIDE`].
 #[inline(always)]
 pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     tree: &T,
@@ -78,8 +78,8 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     left
 }
 
-/// The lanes in `active` that hit anything, packet by packet. Gives the lanes of packets that are part of no beam: for
-/// them, and for packets of which no lane is active, nothing is done.
+/// Adds the lanes in `active` that hit anything to `found`, packet by packet. Gives the lanes that are part of no beam: for
+/// them, and for lanes that are not active, nothing is done.
 #[inline(always)]
 pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
@@ -103,24 +103,19 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     left
 }
 
-/// Takes packets that are done out of those that are left; whether there may be another beam among these.
+/// Takes lanes that are done out of those that are left; whether there may be another beam among these.
 #[inline(always)]
-fn take<const K: usize>(left: &mut [[u32; PACKETS]; K], done: &[u32; K]) -> bool {
+fn take<const K: usize>(left: &mut [[u32; PACKETS]; K], done: &[[u32; PACKETS]; K]) -> bool {
     let (mut count, mut all) = (0, 0);
-    for square in 0..K {
-        for packet in 0..PACKETS {
-            if done[square] >> packet & 1 == 1 {
-                left[square][packet] = 0;
-            }
-            count += u32::from(left[square][packet] != 0);
-        }
-        all |= done[square];
+    for (left, done) in left.as_flattened_mut().iter_mut().zip(done.as_flattened()) {
+        *left &= !done;
+        count += u32::from(*left != 0);
+        all |= done;
     }
     all != 0 && count > FEW
 }
 
-/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which packets of each square
-/// it was.
+/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which lanes it was.
 #[inline(always)]
 fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     tree: &T,
@@ -128,7 +123,7 @@ fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     active: &[[u32; PACKETS]; K],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> [u32; K]
+) -> [[u32; PACKETS]; K]
 where
     L: Sixteen,
     R: Lanes<N>,
@@ -136,29 +131,31 @@ where
     M: Mode,
     P: Probe,
 {
+    let none = [[0; PACKETS]; K];
     if !tree.scale().is_none() {
-        return [0; K];
+        return none;
     }
-    let Some((Form::From, frame)) = form::guess(rays, active) else { return [0; K] };
-    let mut belong = *active;
-    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong) else { return [0; K] };
+    let Some((Form::From, frame)) = form::guess(rays, active) else { return none };
+    let (mut belong, mut slopes) = (*active, Slopes::new());
+    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong, &mut slopes) else { return none };
     let extent = Extent::of_lanes(&extents);
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
     let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
-    bundle.begin();
+    bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
     Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
+    let mut normals = Normals::new();
     for (square, (hits, belong)) in hits.chunks_mut(PACKETS).zip(&belong).enumerate() {
         for (packet, hits) in hits.iter_mut().enumerate() {
             if belong[packet & 15] != 0 {
-                bundle.give(square, packet, hits);
+                bundle.give(square, packet, &mut normals, hits);
             }
         }
     }
-    there(&belong)
+    belong
 }
 
-/// A beam of [`occluded`], with `N` rays to a register; which packets it was.
+/// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
 #[inline(always)]
 fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
@@ -166,15 +163,16 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     active: &[[u32; PACKETS]; 1],
     found: &mut [u32],
     probe: &mut P,
-) -> [u32; 1] {
+) -> [[u32; PACKETS]; 1] {
+    let none = [[0; PACKETS]];
     if !tree.scale().is_none() {
-        return [0];
+        return none;
     }
-    let Some((form, frame)) = form::guess(rays, active) else { return [0] };
+    let Some((form, frame)) = form::guess(rays, active) else { return none };
     let mut seen = Seen::new();
     let [mut belong] = *active;
     let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, &mut belong, &mut seen) else {
-        return [0];
+        return none;
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
     let open = if form == Form::Along {
@@ -183,23 +181,9 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
         trace.shadows::<R, M, P, N, false>(&mut seen, probe)
     };
     for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
-        if *belong != 0 {
-            *found = belong & !open;
-        }
+        *found |= belong & !open;
     }
-    there(&[belong])
-}
-
-/// The packets of each square of which a lane counts.
-#[inline(always)]
-fn there<const K: usize>(lanes: &[[u32; PACKETS]; K]) -> [u32; K] {
-    let mut there = [0; K];
-    for square in 0..K {
-        for packet in 0..PACKETS {
-            there[square] |= u32::from(lanes[square][packet] != 0) << packet;
-        }
-    }
-    there
+    [belong]
 }
 
 /// Rays that are known to be a beam.

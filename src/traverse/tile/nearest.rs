@@ -1,12 +1,13 @@
 //! Rays of a beam from its apex that ask for their closest hits.
 
-use super::beam::{Beam, PACKETS};
+use super::beam::{Beam, Frame, PACKETS};
 use super::bundle::{Bundle, ROUNDINGS, greatest_of_lanes, load_part, load_part3};
+use super::form::Slopes;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
 use crate::simd::{Lanes, Mask, Sixteen};
-use crate::traverse::closest::Closest;
+use crate::traverse::closest::{Closest, Normals};
 use crate::traverse::lanes::{HitPacket, RayPacket};
 use crate::traverse::packet::descend;
 use crate::traverse::records::Records;
@@ -64,18 +65,24 @@ where
         }
     }
 
-    /// Puts the rays at their start. Not a part of [`new`](Self::new): what is made by many steps may be copied when it
+    /// Puts the rays at their start; `slopes` are those of the beam's rays. Not a part of [`new`](Self::new): what is made by many steps may be copied when it
     /// is given, and this is large.
     #[inline(always)]
-    pub fn begin(&mut self) {
+    pub fn begin(&mut self, slopes: &Slopes<K>) {
+        let Frame { axes, sign, .. } = self.beam.frame;
         for square in 0..K {
             let packets = self.rays.len().saturating_sub(square * PACKETS).min(PACKETS);
+            let [first, second] = &slopes.0[square];
             for packet in 0..packets {
                 for part in 0..P {
                     let rays = &self.rays[square * PACKETS + packet];
-                    let direction = load_part3::<N, R>(&rays.direction, part);
-                    self.kept[square][packet][part] =
-                        M::Test::<N, R>::keep(&direction, self.beam.frame.axes[2]);
+                    // Relative to the depth: turning the divisor turns the quotient, and changes nothing else.
+                    let slopes = [
+                        load_part::<N, R>(&first[packet], part) * R::splat(sign),
+                        load_part::<N, R>(&second[packet], part) * R::splat(sign),
+                    ];
+                    let along = load_part::<N, R>(&rays.direction[axes[2]], part);
+                    self.kept[square][packet][part] = M::Test::<N, R>::keep(slopes, along);
                     // Lanes that do not count have found what they look for.
                     let tfar = R::select(
                         self.counts(square, packet, part),
@@ -102,14 +109,14 @@ where
         M::Test::<N, R>::revive(kept, &self.beam.frame.apex, &direction, self.beam.frame.axes[2])
     }
 
-    /// Writes a packet's hits.
+    /// Writes the hits of a packet's lanes that count. `normals` knows what it was asked for the packet before.
     #[inline(always)]
-    pub fn give(&self, square: usize, packet: usize, hits: &mut HitPacket<16>) {
+    pub fn give(&self, square: usize, packet: usize, normals: &mut Normals, hits: &mut HitPacket<16>) {
         for part in 0..P {
             let test = self.part_test(square, packet, part);
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
-            let found = self.closest[square][packet][part].records::<T, M>(self.tree, again);
-            hits.set_part(part, &found);
+            let found = self.closest[square][packet][part].records::<T, M>(self.tree, again, normals);
+            hits.set_part(part, &found, self.active[square][packet] >> (part * N) & ((1 << N) - 1));
         }
     }
 

@@ -28,8 +28,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     type Kept = <Shear<W, L> as Test<W, L>>::Kept;
 
     #[inline(always)]
-    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept {
-        Shear::keep(direction, axis)
+    fn keep(slopes: [L; 2], along: L) -> Self::Kept {
+        Shear::keep(slopes, along)
     }
 
     #[inline(always)]

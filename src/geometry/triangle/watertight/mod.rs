@@ -131,10 +131,8 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     type Kept = Sheared<W, L>;
 
     #[inline(always)]
-    fn keep(direction: &Lanes3<L>, axis: usize) -> Self::Kept {
-        let [i, j, k] = RENAMED[axis];
-        let [dx, dy, dz] = [direction[i], direction[j], direction[k]];
-        Sheared([dx / dz, dy / dz, L::splat(1.0) / dz])
+    fn keep([x, y]: [L; 2], along: L) -> Self::Kept {
+        Sheared([x, y, L::splat(1.0) / along])
     }
 
     #[inline(always)]
