@@ -35,6 +35,7 @@ use crate::geometry::Aabb;
 use crate::geometry::triangle::{Corners, Triangle};
 use crate::huge;
 use crate::mesh::Mesh;
+use crate::simd::prefetch;
 use memory::{Ledger, bytes_of};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -156,6 +157,12 @@ impl KdTree {
     #[inline(always)]
     pub fn lines(&self) -> &[Line] {
         self.lines.all()
+    }
+
+    /// Has a node fetched into the caches. There need not be one at the place.
+    #[inline(always)]
+    pub fn fetch_node(&self, place: usize) {
+        prefetch(self.nodes.as_ptr().wrapping_add(place));
     }
 
     /// The words of all leaves' records.

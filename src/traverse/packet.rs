@@ -109,6 +109,7 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
             let enters_first = first_part.live().any();
             let enters_second = second_part.live().any();
             if enters_first && enters_second {
+                tree.fetch_children(second);
                 stack.push(Waiting { node: second, interval: second_part });
                 (node, interval) = (first, first_part);
             } else if enters_first {
@@ -124,6 +125,10 @@ pub fn descend<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode, const ANY: b
         tree.enter_leaf(node);
         let primitives = tree.primitives(node);
         if !primitives.is_empty() {
+            // Neighbouring packets find them in the caches only where triangles are large.
+            for &primitive in primitives {
+                tree.fetch(primitive);
+            }
             test_leaf::<W, L, T, M, ANY>(tree, primitives, test, tnear, interval.live(), closest, true);
         }
 

@@ -5,6 +5,7 @@ use crate::cache::View;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Mode, Triangle};
 use crate::kdtree::{KdTree, Node, Scale, Tree};
+use crate::simd::prefetch;
 
 /// A tree, with what a mode keeps of each of its triangles.
 pub trait Records<M: Mode>: Tree {
@@ -13,6 +14,14 @@ pub trait Records<M: Mode>: Tree {
 
     /// What is kept of a triangle.
     fn record_of(&self, primitive: u32) -> &M::Record;
+
+    /// Has what is kept of a triangle fetched into the caches, if it is in memory: it will be looked at soon.
+    #[inline(always)]
+    fn fetch(&self, _primitive: u32) {}
+
+    /// The same of the children of an inner node.
+    #[inline(always)]
+    fn fetch_children(&self, _inner: Node) {}
 
     /// What says where triangles have holes, if any have.
     #[inline(always)]
@@ -33,6 +42,18 @@ impl<M: Mode> Records<M> for Resident<'_, M::Record> {
     #[inline(always)]
     fn record_of(&self, primitive: u32) -> &M::Record {
         &self.records[primitive as usize]
+    }
+
+    #[inline(always)]
+    fn fetch(&self, primitive: u32) {
+        let record = self.records.as_ptr().wrapping_add(primitive as usize);
+        prefetch(record);
+        prefetch(record.cast::<u8>().wrapping_add(size_of::<M::Record>() - 1));
+    }
+
+    #[inline(always)]
+    fn fetch_children(&self, inner: Node) {
+        self.tree.fetch_node(inner.below() as usize);
     }
 }
 

@@ -405,6 +405,64 @@ fn a_tile_that_looks_two_ways_is_two_beams() {
     assert_eq!(found.occluded[0], found.occluded[1]);
 }
 
+#[test]
+fn a_packet_that_looks_two_ways_is_part_of_two_beams() {
+    let ceiling = of_triangles((0..400).map(|i| {
+        let corner = Vec3::new((i % 20) as f32 - 10.0, 10.0, (i / 20) as f32 - 10.0) * 0.1;
+        [corner, corner + Vec3::X * 0.05, corner + Vec3::Z * 0.05]
+    }));
+    // Of each packet, the first rays run fastest upward, then some as fast upward as aside, the last ones aside.
+    let eye = Vec3::new(-0.3, 0.2, 0.3);
+    let rays: Vec<Ray> = (0..1024u32)
+        .map(|i| {
+            let (packet, lane) = (i / 16 % 16, i % 16);
+            let aside = [0.9, 1.0, 1.1][((lane + packet / 4) / 6) as usize % 3];
+            let along = (packet as f32 - 7.5) * 0.01 + (i / 256) as f32 * 0.003;
+            Ray::new(eye, Vec3::new(aside, 1.0, along + lane as f32 * 0.001))
+        })
+        .collect();
+    let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+    // Lanes that are not there, in packets of which some are and in others.
+    let some: Vec<u32> = (0..64).map(|i| [0xffff, 0x7ff3, 0xffff, 0, 0x00ff][i % 5]).collect();
+    let nonsense = HitPacket { t: [-7.0; 16], ..HitPacket::miss() };
+    for isa in Isa::available() {
+        let accel = Accel::build(&ceiling, &BuildParams::default()).expect("builds").with_isa(isa);
+        for (count, active) in
+            [(16, [0xffff; 64].to_vec()), (64, [0xffff; 64].to_vec()), (16, some.clone()), (64, some.clone())]
+        {
+            let (packets, active) = (&packets[..count], &active[..count]);
+            let (mut hits, mut occluded) = (vec![nonsense.clone(); count], vec![!0; count]);
+            accel.intersect_tile(packets, active, &mut hits);
+            accel.occluded_tile(packets, active, &mut occluded);
+            let mut found = 0;
+            for packet in 0..count {
+                let alone = accel.intersect_packet(&packets[packet], active[packet]);
+                for lane in 0..16 {
+                    assert_eq!(hits[packet].get(lane), alone.get(lane), "{isa}, {count}: {packet}, {lane}");
+                    found += usize::from(alone.get(lane).is_hit());
+                }
+                assert_eq!(occluded[packet], accel.occluded_packet(&packets[packet], active[packet]));
+            }
+            assert!(found > count, "{found} rays hit anything");
+        }
+        // Both halves are beams: only those are left that run as fast one way as the other.
+        for any_hit in [false, true] {
+            let count = |keep: fn(f32) -> bool| {
+                let kept = |packet: &RayPacket<16>| {
+                    (0..16).filter(|&lane| keep(packet.get(lane).direction.x)).map(|lane| 1 << lane).sum()
+                };
+                let active: [u32; 16] = std::array::from_fn(|packet| kept(&packets[packet]));
+                let mut counts = TileCounts::default();
+                accel.count_tile(&packets[..16], &active, any_hit, &mut counts);
+                (counts.nodes, counts.blocks, counts.tests)
+            };
+            let (up, aside, all) = (count(|x| x < 1.0), count(|x| x > 1.0), count(|_| true));
+            assert!(up.0 > 0 && aside.0 > 0, "both are beams");
+            assert_eq!(all, (up.0 + aside.0, up.1 + aside.1, up.2 + aside.2));
+        }
+    }
+}
+
 /// A picture of 32 x 32 rays as packets in Morton order.
 fn wide_picture(eye: Vec3, at: Vec3, fov: f32) -> Vec<RayPacket<16>> {
     let every_second_bit = |i: usize| (0..5).fold(0, |bits, k| bits | (i >> (2 * k) & 1) << k);

@@ -71,7 +71,7 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
         } else {
             nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, hits, probe)
         };
-        if !take(&mut left, &done) {
+        if !done.take_from(&mut left) {
             break;
         }
     }
@@ -95,7 +95,7 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
         } else {
             shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, found, probe)
         };
-        if !take(&mut left, &done) {
+        if !done.take_from(&mut left) {
             break;
         }
     }
@@ -103,16 +103,28 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     left
 }
 
-/// Takes lanes that are done out of those that are left; whether there may be another beam among these.
-#[inline(always)]
-fn take<const K: usize>(left: &mut [[u32; PACKETS]; K], done: &[[u32; PACKETS]; K]) -> bool {
-    let (mut count, mut all) = (0, 0);
-    for (left, done) in left.as_flattened_mut().iter_mut().zip(done.as_flattened()) {
-        *left &= !done;
-        count += u32::from(*left != 0);
-        all |= done;
+/// What a beam did.
+struct Done<const K: usize> {
+    /// The lanes that it was.
+    lanes: [[u32; PACKETS]; K],
+    /// Whether it paid: its rays were alike enough not to be given up.
+    paid: bool,
+}
+
+impl<const K: usize> Done<K> {
+    /// No beam at all.
+    const NOTHING: Self = Self { lanes: [[0; PACKETS]; K], paid: false };
+
+    /// Takes its lanes out of those that are left, and says whether there may be another beam among these that pays.
+    #[inline(always)]
+    fn take_from(&self, left: &mut [[u32; PACKETS]; K]) -> bool {
+        let mut packets = 0;
+        for (left, done) in left.as_flattened_mut().iter_mut().zip(self.lanes.as_flattened()) {
+            *left &= !done;
+            packets += u32::from(*left != 0);
+        }
+        self.paid && packets > FEW
     }
-    all != 0 && count > FEW
 }
 
 /// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which lanes it was.
@@ -123,7 +135,7 @@ fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     active: &[[u32; PACKETS]; K],
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> [[u32; PACKETS]; K]
+) -> Done<K>
 where
     L: Sixteen,
     R: Lanes<N>,
@@ -131,19 +143,20 @@ where
     M: Mode,
     P: Probe,
 {
-    let none = [[0; PACKETS]; K];
     if !tree.scale().is_none() {
-        return none;
+        return Done::NOTHING;
     }
-    let Some((Form::From, frame)) = form::guess(rays, active) else { return none };
+    let Some((Form::From, frame)) = form::guess(rays, active) else { return Done::NOTHING };
     let (mut belong, mut slopes) = (*active, Slopes::new());
-    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong, &mut slopes) else { return none };
+    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong, &mut slopes) else {
+        return Done::NOTHING;
+    };
     let extent = Extent::of_lanes(&extents);
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
     let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
     bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
-    Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
+    let paid = Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
     let mut normals = Normals::new();
     for (square, (hits, belong)) in hits.chunks_mut(PACKETS).zip(&belong).enumerate() {
         for (packet, hits) in hits.iter_mut().enumerate() {
@@ -152,7 +165,7 @@ where
             }
         }
     }
-    belong
+    Done { lanes: belong, paid }
 }
 
 /// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
@@ -163,19 +176,18 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     active: &[[u32; PACKETS]; 1],
     found: &mut [u32],
     probe: &mut P,
-) -> [[u32; PACKETS]; 1] {
-    let none = [[0; PACKETS]];
+) -> Done<1> {
     if !tree.scale().is_none() {
-        return none;
+        return Done::NOTHING;
     }
-    let Some((form, frame)) = form::guess(rays, active) else { return none };
+    let Some((form, frame)) = form::guess(rays, active) else { return Done::NOTHING };
     let mut seen = Seen::new();
     let [mut belong] = *active;
     let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, &mut belong, &mut seen) else {
-        return none;
+        return Done::NOTHING;
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
-    let open = if form == Form::Along {
+    let (open, paid) = if form == Form::Along {
         trace.shadows::<R, M, P, N, true>(&mut seen, probe)
     } else {
         trace.shadows::<R, M, P, N, false>(&mut seen, probe)
@@ -183,7 +195,7 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
         *found |= belong & !open;
     }
-    [belong]
+    Done { lanes: [belong], paid }
 }
 
 /// Rays that are known to be a beam.
@@ -197,13 +209,13 @@ struct Trace<'a, L, T> {
 }
 
 impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
-    /// The lanes that find nothing.
+    /// The lanes that find nothing, and whether the beam paid.
     #[inline(always)]
     fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(
         &self,
         seen: &mut Seen,
         probe: &mut P,
-    ) -> [u32; PACKETS]
+    ) -> ([u32; PACKETS], bool)
     where
         R: Lanes<N>,
         M: Mode,
@@ -214,7 +226,7 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
         let mut bundle = Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, seen, &interval);
         let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
-        Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
-        bundle.open
+        let paid = Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
+        (bundle.open, paid)
     }
 }

@@ -77,18 +77,19 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
         Self { tree, beam, lanes, squares, block: Block::new(), work: 0 }
     }
 
-    /// Walks the upper tree with all packets of a tile, in which they are in `interval`.
+    /// Walks the upper tree with all packets of a tile, in which they are in `interval`. Gives `false` if that took so much
+    /// work that it was given up, and each packet went on alone.
     #[inline(always)]
     pub fn walk<B: Bundle<L, K>, P: Probe>(
         mut self,
         bundle: &mut B,
         mut interval: Interval<L>,
         probe: &mut P,
-    ) {
+    ) -> bool {
         let (tree, beam) = (self.tree, self.beam);
         let mut live = interval.live().bits();
         if live == 0 {
-            return;
+            return true;
         }
 
         // Packets whose rays are not alike go on alone at once: with them, all would see too much.
@@ -99,7 +100,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
             go_alone(bundle, &interval, loose, 0, probe);
             live &= !loose;
             if live == 0 {
-                return;
+                return true;
             }
             interval.tmin = L::select(narrow, interval.tmin, L::splat(f32::INFINITY));
         }
@@ -147,12 +148,12 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
             if self.work > B::PATIENCE * K as u32 {
                 let rest = Interval { tmin: start.tmin, tmax: bundle.reach_of_lanes().min(start.tmax) };
                 go_alone(bundle, &rest, start.live().bits(), 0, probe);
-                return;
+                return false;
             }
 
             // Take up the next subtree that some packet can still find something in.
             loop {
-                let Some(next) = stack.pop() else { return };
+                let Some(next) = stack.pop() else { return true };
                 let tmax = bundle.reach_of_lanes().min(next.interval.tmax);
                 interval = Interval { tmin: next.interval.tmin, tmax };
                 live = interval.live().bits();
