@@ -64,16 +64,15 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     hits: &mut [HitPacket<16>],
     probe: &mut P,
 ) -> [[u32; PACKETS]; K] {
-    let mut left = *active;
+    let (mut left, mut work) = (*active, 0);
     for _ in 0..BEAMS {
         let done = if S::NATIVE == 16 {
-            nearest::<S::F16, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, hits, probe)
+            nearest::<S::F16, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, work, hits, probe)
         } else {
-            nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, hits, probe)
+            nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, work, hits, probe)
         };
-        if !done.take_from(&mut left) {
-            break;
-        }
+        let Some(so_far) = done.take_from(&mut left) else { break };
+        work = so_far;
     }
     left
 }
@@ -88,16 +87,15 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     found: &mut [u32],
     probe: &mut P,
 ) -> [u32; PACKETS] {
-    let mut left = [*active];
+    let (mut left, mut work) = ([*active], 0);
     for _ in 0..BEAMS {
         let done = if S::NATIVE == 16 {
-            shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, found, probe)
+            shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, work, found, probe)
         } else {
-            shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, found, probe)
+            shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, work, found, probe)
         };
-        if !done.take_from(&mut left) {
-            break;
-        }
+        let Some(so_far) = done.take_from(&mut left) else { break };
+        work = so_far;
     }
     let [left] = left;
     left
@@ -107,23 +105,24 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
 struct Done<const K: usize> {
     /// The lanes that it was.
     lanes: [[u32; PACKETS]; K],
-    /// Whether it paid: its rays were alike enough not to be given up.
-    paid: bool,
+    /// The work done for its tile so far, if it paid: if its rays were alike enough not to be given up.
+    work: Option<u32>,
 }
 
 impl<const K: usize> Done<K> {
     /// No beam at all.
-    const NOTHING: Self = Self { lanes: [[0; PACKETS]; K], paid: false };
+    const NOTHING: Self = Self { lanes: [[0; PACKETS]; K], work: None };
 
-    /// Takes its lanes out of those that are left, and says whether there may be another beam among these that pays.
+    /// Takes its lanes out of those that are left, and gives the work so far if there may be another beam among these
+    /// that pays.
     #[inline(always)]
-    fn take_from(&self, left: &mut [[u32; PACKETS]; K]) -> bool {
+    fn take_from(&self, left: &mut [[u32; PACKETS]; K]) -> Option<u32> {
         let mut packets = 0;
         for (left, done) in left.as_flattened_mut().iter_mut().zip(self.lanes.as_flattened()) {
             *left &= !done;
             packets += u32::from(*left != 0);
         }
-        self.paid && packets > FEW
+        self.work.filter(|_| packets > FEW)
     }
 }
 
@@ -133,6 +132,7 @@ fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; K],
+    work: u32,
     hits: &mut [HitPacket<16>],
     probe: &mut P,
 ) -> Done<K>
@@ -156,7 +156,7 @@ where
     let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
     bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
-    let paid = Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
+    let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
     let mut normals = Normals::new();
     for (square, (hits, belong)) in hits.chunks_mut(PACKETS).zip(&belong).enumerate() {
         for (packet, hits) in hits.iter_mut().enumerate() {
@@ -165,7 +165,7 @@ where
             }
         }
     }
-    Done { lanes: belong, paid }
+    Done { lanes: belong, work }
 }
 
 /// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
@@ -174,6 +174,7 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; 1],
+    work: u32,
     found: &mut [u32],
     probe: &mut P,
 ) -> Done<1> {
@@ -187,15 +188,15 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
         return Done::NOTHING;
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
-    let (open, paid) = if form == Form::Along {
-        trace.shadows::<R, M, P, N, true>(&mut seen, probe)
+    let (open, work) = if form == Form::Along {
+        trace.shadows::<R, M, P, N, true>(&mut seen, work, probe)
     } else {
-        trace.shadows::<R, M, P, N, false>(&mut seen, probe)
+        trace.shadows::<R, M, P, N, false>(&mut seen, work, probe)
     };
     for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
         *found |= belong & !open;
     }
-    Done { lanes: [belong], paid }
+    Done { lanes: [belong], work }
 }
 
 /// Rays that are known to be a beam.
@@ -209,13 +210,14 @@ struct Trace<'a, L, T> {
 }
 
 impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
-    /// The lanes that find nothing, and whether the beam paid.
+    /// The lanes that find nothing, and the work so far if the beam paid.
     #[inline(always)]
     fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(
         &self,
         seen: &mut Seen,
+        work: u32,
         probe: &mut P,
-    ) -> ([u32; PACKETS], bool)
+    ) -> ([u32; PACKETS], Option<u32>)
     where
         R: Lanes<N>,
         M: Mode,
@@ -226,7 +228,7 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
         let mut bundle = Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, seen, &interval);
         let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
-        let paid = Descent::new(tree, &beam, &squares).walk(&mut bundle, interval, probe);
-        (bundle.open, paid)
+        let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
+        (bundle.open, work)
     }
 }

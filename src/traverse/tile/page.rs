@@ -70,26 +70,27 @@ pub struct Descent<'a, L, T, const PARALLEL: bool, const K: usize> {
 }
 
 impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, L, T, PARALLEL, K> {
+    /// A bundle for whose tile so much work was done before.
     #[inline(always)]
-    pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>, squares: &'a [Window<L>; K]) -> Self {
+    pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>, squares: &'a [Window<L>; K], work: u32) -> Self {
         let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
         let lanes = Window::new(beam.low, beam.high, never, ever, beam.spread.blur::<PARALLEL>());
-        Self { tree, beam, lanes, squares, block: Block::new(), work: 0 }
+        Self { tree, beam, lanes, squares, block: Block::new(), work }
     }
 
-    /// Walks the upper tree with all packets of a tile, in which they are in `interval`. Gives `false` if that took so much
-    /// work that it was given up, and each packet went on alone.
+    /// Walks the upper tree with all packets of a tile, in which they are in `interval`. Gives the work that this took beside
+    /// what was done before, or `None` if that was so much that it was given up, and each packet went on alone.
     #[inline(always)]
     pub fn walk<B: Bundle<L, K>, P: Probe>(
         mut self,
         bundle: &mut B,
         mut interval: Interval<L>,
         probe: &mut P,
-    ) -> bool {
+    ) -> Option<u32> {
         let (tree, beam) = (self.tree, self.beam);
         let mut live = interval.live().bits();
         if live == 0 {
-            return true;
+            return Some(self.work);
         }
 
         // Packets whose rays are not alike go on alone at once: with them, all would see too much.
@@ -100,7 +101,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
             go_alone(bundle, &interval, loose, 0, probe);
             live &= !loose;
             if live == 0 {
-                return true;
+                return Some(self.work);
             }
             interval.tmin = L::select(narrow, interval.tmin, L::splat(f32::INFINITY));
         }
@@ -148,12 +149,12 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
             if self.work > B::PATIENCE * K as u32 {
                 let rest = Interval { tmin: start.tmin, tmax: bundle.reach_of_lanes().min(start.tmax) };
                 go_alone(bundle, &rest, start.live().bits(), 0, probe);
-                return false;
+                return None;
             }
 
             // Take up the next subtree that some packet can still find something in.
             loop {
-                let Some(next) = stack.pop() else { return true };
+                let Some(next) = stack.pop() else { return Some(self.work) };
                 let tmax = bundle.reach_of_lanes().min(next.interval.tmax);
                 interval = Interval { tmin: next.interval.tmin, tmax };
                 live = interval.live().bits();
