@@ -21,7 +21,7 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
 
     /// What to keep of rays whose directions are greatest along an axis: `along` is what they are there, and `slopes` are
-    /// the quotients of the other two, renamed as [`RENAMED`](super::RENAMED) says, and `along`.
+    /// the quotients of the other two, renamed as `RENAMED` says, and `along`.
     fn keep(slopes: [L; 2], along: L) -> Self::Kept;
 
     /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept.
