@@ -159,10 +159,10 @@ impl KdTree {
         self.lines.all()
     }
 
-    /// Has a node fetched into the caches. There need not be one at the place.
+    /// Has a node's children fetched into the caches. A leaf has none; then something else is asked for.
     #[inline(always)]
-    pub fn fetch_node(&self, place: usize) {
-        prefetch(self.nodes.as_ptr().wrapping_add(place));
+    pub fn fetch_children(&self, node: Node) {
+        prefetch(self.nodes.as_ptr().wrapping_add(node.below() as usize));
     }
 
     /// The words of all leaves' records.

@@ -38,7 +38,7 @@ pub use dense::Dense;
 pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
 pub use lanes::{Lanes, Mask, Simd};
-pub use prefetch::prefetch;
+pub use prefetch::{prefetch, prefetch_both};
 pub use sixteen::Sixteen;
 
 #[cfg(test)]

@@ -1,5 +1,12 @@
 //! A hint to the caches.
 
+/// Asks for the two cache lines that a value of up to 64 bytes may lie in, as [`prefetch`] does.
+#[inline(always)]
+pub fn prefetch_both<T>(at: *const T) {
+    prefetch(at);
+    prefetch(at.cast::<u8>().wrapping_add(size_of::<T>() - 1));
+}
+
 /// Asks for the cache line at an address. A hint: it changes no result, the address need not be one of
 /// anything, and nothing happens where the machine has no such instruction.
 #[inline(always)]

@@ -342,18 +342,13 @@ impl Accel {
             [left] = self.ask(IntersectTile { rays, active: &[left], hits: &mut *hits });
         }
         for (((rays, &active), left), hits) in rays.iter().zip(lanes).zip(left).zip(hits) {
-            if active == 0 {
-                *hits = HitPacket::miss();
-            } else if left == active {
-                *hits = self.intersect_packet(rays, left);
-            } else {
-                // Beams have written the lanes that were part of them, and no others.
-                if left != 0 {
-                    hits.set_part(0, &self.intersect_packet(rays, left), left);
-                }
-                if active != lanes_of(16) {
-                    hits.set_part(0, &HitPacket::<16>::miss(), lanes_of(16) & !active);
-                }
+            // Beams have written the lanes that were part of them, and no others.
+            if left != 0 {
+                hits.set_part(0, &self.intersect_packet(rays, left), left);
+            }
+            let absent = lanes_of(16) & !active;
+            if absent != 0 {
+                hits.set_part(0, &HitPacket::<16>::miss(), absent);
             }
         }
     }

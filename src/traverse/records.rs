@@ -5,7 +5,7 @@ use crate::cache::View;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::{Mode, Triangle};
 use crate::kdtree::{KdTree, Node, Scale, Tree};
-use crate::simd::prefetch;
+use crate::simd::prefetch_both;
 
 /// A tree, with what a mode keeps of each of its triangles.
 pub trait Records<M: Mode>: Tree {
@@ -19,9 +19,9 @@ pub trait Records<M: Mode>: Tree {
     #[inline(always)]
     fn fetch(&self, _primitive: u32) {}
 
-    /// The same of the children of an inner node.
+    /// The same of a node's children. A leaf has none; then something else is asked for, which does no harm.
     #[inline(always)]
-    fn fetch_children(&self, _inner: Node) {}
+    fn fetch_children(&self, _node: Node) {}
 
     /// What says where triangles have holes, if any have.
     #[inline(always)]
@@ -46,14 +46,12 @@ impl<M: Mode> Records<M> for Resident<'_, M::Record> {
 
     #[inline(always)]
     fn fetch(&self, primitive: u32) {
-        let record = self.records.as_ptr().wrapping_add(primitive as usize);
-        prefetch(record);
-        prefetch(record.cast::<u8>().wrapping_add(size_of::<M::Record>() - 1));
+        prefetch_both(self.records.as_ptr().wrapping_add(primitive as usize));
     }
 
     #[inline(always)]
-    fn fetch_children(&self, inner: Node) {
-        self.tree.fetch_node(inner.below() as usize);
+    fn fetch_children(&self, node: Node) {
+        self.tree.fetch_children(node);
     }
 }
 

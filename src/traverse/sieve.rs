@@ -90,6 +90,16 @@ impl<M: Mode> Records<M> for Sifted<'_, M::Record> {
     }
 
     #[inline(always)]
+    fn fetch(&self, primitive: u32) {
+        Records::<M>::fetch(&self.resident, primitive);
+    }
+
+    #[inline(always)]
+    fn fetch_children(&self, node: Node) {
+        Records::<M>::fetch_children(&self.resident, node);
+    }
+
+    #[inline(always)]
     fn sieve(&self) -> Option<&dyn Sieve> {
         Some(self.sieve)
     }

@@ -83,12 +83,12 @@ mod tests {
             prop_assert!(normal.is_normalized() && normal.z > 0.0, "{normal}");
             let mirrored = (-view).reflect(normal);
             prop_assert!(mirrored.z > 0.0, "{view} {shading}: {normal} {mirrored}");
-            let faces_view = normal.dot(view) > 0.0;
             if shading.z.abs() < 1e-4 {
                 // There is no side of the triangle to bend such a normal to.
                 prop_assert_eq!(normal, Vec3::Z);
                 return Ok(());
             }
+            let faces_view = normal.dot(view) > 0.0;
             let kept = shading * 1.0f32.copysign(shading.z);
             prop_assert!(faces_view || normal == kept, "{view} {shading}: {normal}");
             // It is between the two, in their plane: nothing turns sideways.

@@ -5,7 +5,7 @@ use super::lists::{Entries, List};
 use super::lot::Lot;
 use crate::geometry::triangle::{Mode, Test};
 use crate::kdtree::Exit;
-use crate::simd::{Dense, Mask, prefetch};
+use crate::simd::{Dense, Mask, prefetch_both};
 use crate::traverse::records::Resident;
 
 /// Triangles that are sifted before some are tested.
@@ -22,9 +22,7 @@ fn primitives<'a, R>(resident: &Resident<'a, R>, list: &List) -> &'a [u32] {
 #[inline(always)]
 pub fn fetch<R>(resident: &Resident<'_, R>, list: &List) {
     for &primitive in primitives(resident, list) {
-        let record = resident.records.as_ptr().wrapping_add(primitive as usize);
-        prefetch(record);
-        prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
+        prefetch_both(resident.records.as_ptr().wrapping_add(primitive as usize));
     }
 }
 

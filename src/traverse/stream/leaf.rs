@@ -7,7 +7,7 @@
 
 use super::flight::Flight;
 use crate::geometry::triangle::Alone;
-use crate::simd::{Eight, Mask, prefetch};
+use crate::simd::{Eight, Mask, prefetch_both};
 use std::hint::select_unpredictable;
 
 /// Where a ray is in its leaf: eight triangles, and what it found in them.
@@ -55,9 +55,7 @@ impl Leaf {
         let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
         self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
         for primitive in self.primitives {
-            let record = records.as_ptr().wrapping_add(primitive as usize);
-            prefetch(record);
-            prefetch(record.cast::<u8>().wrapping_add(size_of::<R>() - 1));
+            prefetch_both(records.as_ptr().wrapping_add(primitive as usize));
         }
     }
 }

@@ -117,12 +117,14 @@ impl<const K: usize> Done<K> {
     /// that pays.
     #[inline(always)]
     fn take_from(&self, left: &mut [[u32; PACKETS]; K]) -> Option<u32> {
-        let mut packets = 0;
+        let (mut packets, mut all) = (0, 0);
         for (left, done) in left.as_flattened_mut().iter_mut().zip(self.lanes.as_flattened()) {
             *left &= !done;
             packets += u32::from(*left != 0);
+            all |= done;
         }
-        self.work.filter(|_| packets > FEW)
+        // Where nothing was taken, the same rays would be tried again.
+        self.work.filter(|_| all != 0 && packets > FEW)
     }
 }
 

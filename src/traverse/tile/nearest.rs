@@ -65,8 +65,8 @@ where
         }
     }
 
-    /// Puts the rays at their start; `slopes` are those of the beam's rays. Not a part of [`new`](Self::new): what is made by many steps may be copied when it
-    /// is given, and this is large.
+    /// Puts the rays at their start; `slopes` are those of the beam's rays. Not a part of [`new`](Self::new): what is made by
+    /// many steps may be copied when it is given, and this is large.
     #[inline(always)]
     pub fn begin(&mut self, slopes: &Slopes<K>) {
         let Frame { axes, sign, .. } = self.beam.frame;
@@ -95,10 +95,16 @@ where
         }
     }
 
-    /// The lanes of a part that count.
+    /// The lanes of a part that count, a bit for each.
+    #[inline(always)]
+    fn lanes(&self, square: usize, packet: usize, part: usize) -> u32 {
+        self.active[square][packet] >> (part * N) & ((1 << N) - 1)
+    }
+
+    /// The same as a mask.
     #[inline(always)]
     fn counts(&self, square: usize, packet: usize, part: usize) -> R::Mask {
-        R::mask_from_bits(self.active[square][packet] >> (part * N) & ((1 << N) - 1))
+        R::mask_from_bits(self.lanes(square, packet, part))
     }
 
     /// A part's test.
@@ -116,7 +122,7 @@ where
             let test = self.part_test(square, packet, part);
             let again = if M::Test::<N, R>::DEFERS { Some(&test) } else { None };
             let found = self.closest[square][packet][part].records::<T, M>(self.tree, again, normals);
-            hits.set_part(part, &found, self.active[square][packet] >> (part * N) & ((1 << N) - 1));
+            hits.set_part(part, &found, self.lanes(square, packet, part));
         }
     }
 
@@ -201,7 +207,7 @@ where
         let mut changed = false;
         for part in 0..P {
             let rays = self.rays[square * PACKETS + packet].part::<N>(part);
-            let active = self.active[square][packet] >> (part * N) & ((1 << N) - 1);
+            let active = self.lanes(square, packet, part);
             let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
             let speed = R::load(&rays.direction[self.beam.frame.axes[2]]).abs();
             let mut closest = self.closest[square][packet][part];

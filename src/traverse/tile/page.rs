@@ -6,9 +6,8 @@ use super::beam::{Beam, Extent, PACKETS};
 use super::bundle::{Bundle, packet_of, packets_of};
 use super::outline::{Block, Outline, Window};
 use super::probe::Probe;
-use crate::geometry::triangle::Triangle;
 use crate::kdtree::Tree;
-use crate::simd::{Mask, Sixteen, prefetch, stay_a_branch};
+use crate::simd::{Mask, Sixteen, prefetch_both, stay_a_branch};
 use crate::traverse::stack::Stack;
 use crate::traverse::walk::Interval;
 
@@ -195,9 +194,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
             }
             next = blocks.next();
             for &primitive in next.unwrap_or_default() {
-                let triangle = &raw const *self.tree.triangle(primitive);
-                prefetch(triangle);
-                prefetch(triangle.cast::<u8>().wrapping_add(size_of::<Triangle>() - 1));
+                prefetch_both(&raw const *self.tree.triangle(primitive));
             }
             self.work += BLOCK_WORK;
 
