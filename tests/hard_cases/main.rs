@@ -25,6 +25,7 @@ mod scene;
 
 mod axis_parallel;
 mod beams;
+mod belonging;
 mod degenerate;
 mod garbage;
 mod grazing;
