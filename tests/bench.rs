@@ -103,6 +103,25 @@ fn kernels_can_be_given_rays_in_a_row() {
 }
 
 #[test]
+fn pools_are_counted_with_the_tree() {
+    let (_folder, model) = model();
+    let options = ["--engines", "raypack", "--rays", "random", "--threads", "1", "--json", "-"];
+    let report = |more: &[&str]| -> Value {
+        let run = bench(&model).args(options).args(more).assert();
+        serde_json::from_slice(&run.success().get_output().stdout).unwrap()
+    };
+    let [without, with] = [report(&[]), report(&["--pools"])];
+    assert_eq!((&without["header"]["pools"], &with["header"]["pools"]), (&false.into(), &true.into()));
+    let bytes = |report: &Value| report["rows"][0]["bytes"].as_u64().unwrap();
+    assert!(bytes(&with) > bytes(&without));
+    for (a, b) in with["rows"].as_array().unwrap().iter().zip(without["rows"].as_array().unwrap()) {
+        assert_eq!((&a["mode"], &a["hits"]), (&b["mode"], &b["hits"]));
+    }
+    let refused = bench(&model).args(options).args(["--pools", "--accuracy", "fast"]).assert();
+    refused.failure().code(1).stderr(predicate::str::contains("--pools: --accuracy fast has no use"));
+}
+
+#[test]
 fn every_accuracy_can_be_raced() {
     let (_folder, model) = model();
     for accuracy in ["fast", "watertight", "exact"] {

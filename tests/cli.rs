@@ -100,8 +100,12 @@ fn every_tuning_gives_the_same_file() {
     let place = house();
     place.succeed("render house.ply -o a.exr --size 33x21 --threads 1 --packet 1 --tile 1024");
     let expected = fs::read(place.path("a.exr")).expect("written");
-    for tuning in ["--threads 3 --packet 4 --tile 5", "--threads 0 --packet 8", "--pin --packet 16 --tile 1"]
-    {
+    for tuning in [
+        "--threads 3 --packet 4 --tile 5",
+        "--threads 0 --packet 8",
+        "--pin --packet 16 --tile 1",
+        "--pools --packet 64",
+    ] {
         place.succeed(&format!("render house.ply -o b.exr --size 33x21 {tuning}"));
         assert!(fs::read(place.path("b.exr")).expect("written") == expected, "{tuning}");
     }

@@ -1,7 +1,7 @@
 //! `raypack bench MODEL`: rays per second, beside Embree and obvhs.
 
 use super::model::Model;
-use super::options::{AccuracyOption, BuildOptions};
+use super::options::{AccuracyOption, BuildOptions, PoolsOption};
 use super::report::Json;
 use crate::error::{Error, Result};
 use crate::scene::Camera;
@@ -56,6 +56,8 @@ pub struct Args {
     build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
+    #[command(flatten)]
+    pools: PoolsOption,
     /// Rounds of each race at most; its middle round is reported
     #[arg(long, default_value_t = 9)]
     rounds: usize,
@@ -119,6 +121,8 @@ fn options(args: &Args) -> Result<Options> {
     if !(args.seconds >= 0.0 && args.seconds.is_finite()) {
         return Err(Error::option("--seconds", format!("{} is no time", args.seconds)));
     }
+    let accuracy = args.accuracy.mode()?;
+    args.pools.check(&args.build, accuracy)?;
     Ok(Options {
         kinds: args.rays.iter().map(|name| name.parse::<RayKind>()).collect::<Result<_>>()?,
         engines: args.engines.iter().map(|name| name.parse::<EngineName>()).collect::<Result<_>>()?,
@@ -130,9 +134,10 @@ fn options(args: &Args) -> Result<Options> {
         pace: Pace { rounds: args.rounds, seconds: args.seconds, all_modes: args.all_modes, pin: args.pin },
         isa: Isa::from_env()?,
         hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
-        accuracy: args.accuracy.mode()?,
+        accuracy,
         build: args.build.profile()?.build,
         slices: args.slices,
+        pools: args.pools.wanted(),
     })
 }
 

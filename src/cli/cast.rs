@@ -2,7 +2,7 @@
 
 use super::cache_options::{BYTES_PER_WORKER, CacheArgs, CacheReport, Within, describe_memory};
 use super::memory::{Beside, MemoryReport};
-use super::options::{AccuracyOption, BuildOptions, as_option};
+use super::options::{AccuracyOption, BuildOptions, PoolsOption, as_option};
 use super::outputs::same_file;
 use super::progress::watch;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration, grouped};
@@ -66,6 +66,8 @@ pub struct Args {
     any: bool,
     #[command(flatten)]
     accuracy: AccuracyOption,
+    #[command(flatten)]
+    pools: PoolsOption,
     /// Worker threads; 0 for all processors [default: the profile's]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -120,6 +122,7 @@ pub fn run(args: &Args) -> Result<()> {
     let isa = Isa::from_env()?;
     let profile = args.build.profile_for(Some(&args.scene), true)?;
     let accuracy = args.accuracy.mode()?;
+    args.pools.check(&args.build, accuracy)?;
     let kernel = args.kernel()?;
     let threads = args.threads(&profile)?;
     args.check_output()?;
@@ -148,6 +151,7 @@ pub fn run(args: &Args) -> Result<()> {
         }
     };
     scene.accel.set_accuracy(accuracy);
+    args.pools.make(&scene.accel)?;
 
     let batch = Batch::new(&scene.accel, &rays).with_kernel(kernel).with_threads(threads);
     let (traced, hits, write_seconds) = args.cast(&batch, &rays, &scene)?;

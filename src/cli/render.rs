@@ -7,7 +7,7 @@ use super::cache_options::{BYTES_PER_WORKER, CacheArgs, Within};
 use super::looks::LooksOptions;
 use super::memory::Beside;
 use super::model::Model;
-use super::options::{AccuracyOption, BuildOptions, as_option, orbit};
+use super::options::{AccuracyOption, BuildOptions, PoolsOption, as_option, orbit};
 use super::outputs::Outputs;
 use super::progress::watch;
 use super::report::Json;
@@ -74,6 +74,8 @@ pub struct Args {
     #[command(flatten)]
     accuracy: AccuracyOption,
     #[command(flatten)]
+    pools: PoolsOption,
+    #[command(flatten)]
     cache: CacheArgs,
     /// What comes before it is needed, with --loading async: what lies beside a block that is read from the disk, as long
     /// as there is room (beside: so it is by itself), what coming tiles and the next frame will need (ahead), or nothing
@@ -119,6 +121,7 @@ pub fn run(args: &Args) -> Result<()> {
     let profile = args.build.profile_for(args.scene.as_deref(), true)?;
     let settings = args.settings(&profile)?;
     let accuracy = args.accuracy.mode()?;
+    args.pools.check(&args.build, accuracy)?;
     args.looks.check()?;
     let camera = args.camera.as_deref().map(Camera::parse).transpose()?;
     let orbit = args.orbit()?;
@@ -155,6 +158,7 @@ pub fn run(args: &Args) -> Result<()> {
         }
     };
     scene.accel.set_accuracy(accuracy);
+    args.pools.make(&scene.accel)?;
     let camera = camera.unwrap_or_else(|| args.default_camera(&scene, settings.size));
     camera.check()?;
     if let Some(shown) = heatmap {

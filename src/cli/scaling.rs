@@ -2,7 +2,7 @@
 
 use super::bench::{threads, watch};
 use super::generate::count;
-use super::options::{AccuracyOption, BuildOptions};
+use super::options::{AccuracyOption, BuildOptions, PoolsOption};
 use super::outputs::check_plot;
 use super::report::Json;
 use crate::error::{Error, Result};
@@ -57,6 +57,8 @@ pub struct Args {
     build: BuildOptions,
     #[command(flatten)]
     accuracy: AccuracyOption,
+    #[command(flatten)]
+    pools: PoolsOption,
     /// Draw the curves: .svg or .png
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -86,6 +88,8 @@ fn options(args: &Args) -> Result<Options> {
     if args.rounds == 0 {
         return Err(Error::option("--rounds", "0 rounds measure nothing"));
     }
+    let accuracy = args.accuracy.mode()?;
+    args.pools.check(&args.build, accuracy)?;
     Ok(Options {
         triangles: args.triangles.iter().map(|text| count(text)).collect::<Result<_>>()?,
         seed: args.seed,
@@ -100,9 +104,10 @@ fn options(args: &Args) -> Result<Options> {
             pace: Pace { rounds: args.rounds, seconds: 5.0, all_modes: false, pin: false },
             isa: Isa::from_env()?,
             hold_peers_to_isa: std::env::var_os("RAYPACK_ISA").is_some(),
-            accuracy: args.accuracy.mode()?,
+            accuracy,
             build: args.build.profile()?.build,
             slices: false,
+            pools: args.pools.wanted(),
         },
     })
 }

@@ -107,6 +107,9 @@ struct TreeReport<'a> {
     /// [`KdTree::duplication`](crate::kdtree::KdTree::duplication), where it was counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     duplication_histogram: Option<&'a [usize]>,
+    /// Bytes of pools, if they were made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pool_bytes: Option<usize>,
 }
 
 impl<'a> SceneReport<'a> {
@@ -253,8 +256,16 @@ impl Scene {
             vertices: self.vertices,
             bounds: [bounds.min.to_array(), bounds.max.to_array()],
             origin: &self.origin,
-            tree: TreeReport { stats: &self.tree, duplication_histogram: None },
+            tree: TreeReport {
+                stats: &self.tree,
+                duplication_histogram: None,
+                pool_bytes: self.pool_bytes(),
+            },
         }
+    }
+
+    fn pool_bytes(&self) -> Option<usize> {
+        Some(self.accel.pool_bytes()).filter(|&bytes| bytes > 0)
     }
 
     /// The same in words.
@@ -276,6 +287,10 @@ impl Scene {
             }
         }
         describe_tree(lines, &self.tree);
+        if let Some(pools) = self.pool_bytes() {
+            let each = pools as f64 / self.tree.triangles as f64;
+            lines.add("pools", format!("{}, {each:.1} bytes per triangle", bytes(pools as u64)));
+        }
     }
 }
 

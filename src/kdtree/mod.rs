@@ -11,6 +11,7 @@ pub mod outer;
 mod pages;
 mod params;
 mod parts;
+mod pools;
 mod preset;
 mod sah;
 mod scale;
@@ -24,6 +25,7 @@ pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
 pub(crate) use parts::Walked;
 pub use parts::{Arrays, Parts};
+pub use pools::{Chunk, MOST, Pools};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};
 pub use spread::SPREAD_BLOCKS;
@@ -103,6 +105,8 @@ pub struct KdTree {
     build_peak: usize,
     /// What a walk of the whole tree counts, once someone has asked.
     stats: OnceLock<TreeStats>,
+    /// Leaves that hold their corners, once someone has asked for them.
+    pools: OnceLock<Option<Pools>>,
 }
 
 impl KdTree {
@@ -145,6 +149,7 @@ impl KdTree {
             params: params.clone(),
             build_peak: ledger.peak(),
             stats: OnceLock::new(),
+            pools: OnceLock::new(),
         })
     }
 
@@ -157,6 +162,18 @@ impl KdTree {
     #[inline(always)]
     pub fn lines(&self) -> &[Line] {
         self.lines.all()
+    }
+
+    /// Makes leaves that hold their corners, if they have not been made. Whether there are any now: a tree may be too
+    /// large for them.
+    pub fn make_pools(&self) -> bool {
+        self.pools.get_or_init(|| Pools::of_tree(self)).is_some()
+    }
+
+    /// Leaves that hold their corners, if they have been made.
+    #[inline(always)]
+    pub fn pools(&self) -> Option<&Pools> {
+        self.pools.get()?.as_ref()
     }
 
     /// Has a node's children fetched into the caches. A leaf has none; then something else is asked for.

@@ -93,6 +93,7 @@ impl KdTree {
             params: parts.params,
             build_peak: parts.build_peak,
             stats: OnceLock::from(parts.stats),
+            pools: OnceLock::new(),
         })
     }
 }
@@ -134,6 +135,7 @@ impl From<Walked> for KdTree {
             params: BuildParams::default(),
             build_peak: 0,
             stats: OnceLock::new(),
+            pools: OnceLock::new(),
         }
     }
 }

@@ -27,15 +27,21 @@ pub struct Split {
 pub struct CellCost<'a> {
     params: &'a BuildParams,
     cell: Aabb,
+    clearance: f32,
     inverse_area: f64,
 }
 
 impl<'a> CellCost<'a> {
-    /// The model for a cell; `None` if the cell has no area (a point or a line), where
-    /// probabilities mean nothing and no split can help.
-    pub fn new(params: &'a BuildParams, cell: Aabb) -> Option<Self> {
+    /// The model for a cell in which planes keep so far away from what they part; `None` if the cell has no area (a
+    /// point or a line), where probabilities mean nothing and no split can help.
+    pub fn new(params: &'a BuildParams, cell: Aabb, clearance: f32) -> Option<Self> {
         let area = cell.area();
-        (area > 0.0 && area.is_finite()).then(|| Self { params, cell, inverse_area: 1.0 / area })
+        (area > 0.0 && area.is_finite()).then(|| Self { params, cell, clearance, inverse_area: 1.0 / area })
+    }
+
+    /// How far planes keep away from what they part.
+    pub fn clearance(&self) -> f32 {
+        self.clearance
     }
 
     /// What a leaf of `count` triangles costs.
@@ -89,6 +95,7 @@ impl<'a> CellCost<'a> {
             high,
             cap: 2.0 * e1 * e2 * self.inverse_area,
             wall: 2.0 * (e1 + e2) * self.inverse_area,
+            face: 1.5 * f64::from(self.clearance),
             traversal: f64::from(self.params.traversal_cost),
             intersection: f64::from(self.params.intersection_cost),
             kept: 1.0 - f64::from(self.params.empty_bonus),
@@ -106,6 +113,8 @@ pub struct AxisCost {
     cap: f64,
     /// Area of the walls for each unit of length, relative to the cell's.
     wall: f64,
+    /// How near to a face a plane is in it, if it parts nothing.
+    face: f64,
     traversal: f64,
     intersection: f64,
     /// What is left of a cost when one side is empty.
@@ -128,6 +137,8 @@ impl AxisCost {
             low: self.low as f32,
             high: self.high as f32,
             length: length as f32,
+            low_face: (self.low + self.face) as f32,
+            high_face: (self.high - self.face) as f32,
             cap: (self.cap * self.intersection) as f32,
             side: (self.wall * length * self.intersection) as f32,
             traversal: self.traversal as f32,
@@ -140,8 +151,9 @@ impl AxisCost {
     #[inline]
     pub fn cost(&self, position: f32, below: usize, above: usize) -> f64 {
         let x = f64::from(position);
-        let (flat_below, flat_above) = (x <= self.low, x >= self.high);
-        // A plane in a face cuts off a flat cell: that only helps if the triangles are divided.
+        let (flat_below, flat_above) = (x <= self.low + self.face, x >= self.high - self.face);
+        // A plane in a face cuts off a flat cell: that only helps if the triangles are divided. One that is as near to a
+        // face as planes keep away from triangles would be found again and again.
         if (flat_below || flat_above) && (below == 0 || above == 0) {
             return f64::INFINITY;
         }
@@ -166,6 +178,8 @@ pub struct LaneCost {
     low: f32,
     high: f32,
     length: f32,
+    low_face: f32,
+    high_face: f32,
     /// What a triangle costs that only the ends' area counts for, and what all the walls add.
     cap: f32,
     side: f32,
@@ -184,7 +198,7 @@ impl LaneCost {
         let costs_above = (cap + side * ((high - plane) / length)) * above;
         let cost = L::splat(self.traversal) + (costs_below + costs_above);
         let none = below.le(zero) | above.le(zero);
-        let in_face = plane.le(low) | high.le(plane);
+        let in_face = plane.le(L::splat(self.low_face)) | L::splat(self.high_face).le(plane);
         let cost = L::select(none, cost * L::splat(self.kept), cost);
         L::select(none & in_face, L::splat(f32::INFINITY), cost)
     }

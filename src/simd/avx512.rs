@@ -235,6 +235,18 @@ impl Sixteen for F32x16 {
     fn ids_load(ids: &[i32; 16]) -> __m512i {
         avx512!(_mm512_loadu_si512(ids.as_ptr().cast()))
     }
+    #[inline(always)]
+    fn ids_widen(ids: &[u16; 16]) -> __m512i {
+        avx512!(_mm512_cvtepu16_epi32(_mm256_loadu_si256(ids.as_ptr().cast())))
+    }
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: __m512i) -> __m512i {
+        avx512!(_mm512_srl_epi32(ids, _mm_cvtsi32_si128(BITS)))
+    }
+    #[inline(always)]
+    fn pick(self, ids: __m512i) -> Self {
+        Self(avx512!(_mm512_permutexvar_ps(ids, self.0)))
+    }
     // Closed up in the register, and stored whole: stores of single lanes are slow.
     #[inline(always)]
     fn compact(self, bits: u32, to: &mut [f32; 16]) {

@@ -154,6 +154,23 @@ impl<L: Eight> Sixteen for Pair<L> {
         Pair(L::ids_load(low), L::ids_load(high))
     }
     #[inline(always)]
+    fn ids_widen(ids: &[u16; 16]) -> Self::Ids {
+        let [low, high] = ids.as_chunks::<8>().0 else { unreachable!("sixteen are two eights") };
+        Pair(L::ids_widen(low), L::ids_widen(high))
+    }
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids {
+        Pair(L::ids_shift::<BITS>(ids.0), L::ids_shift::<BITS>(ids.1))
+    }
+    #[inline(always)]
+    fn pick(self, ids: Self::Ids) -> Self {
+        let half = |ids: L::Ids| {
+            let is_low = L::ids_less(L::ids_and(ids, L::ids(15)), L::ids(8));
+            L::select(is_low, self.0.pick(ids), self.1.pick(ids))
+        };
+        Self(half(ids.0), half(ids.1))
+    }
+    #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
         let [a, b, c, d] = half_of_fours::<L>(fours, 0);
         let [e, f, g, h] = half_of_fours::<L>(fours, 8);

@@ -32,6 +32,37 @@ pub trait Sixteen: Lanes<16> {
     /// Lane `i` is `ids[i]`.
     fn ids_load(ids: &[i32; 16]) -> Self::Ids;
 
+    /// Lane `i` is `ids[i]`, widened without a sign.
+    #[inline(always)]
+    fn ids_widen(ids: &[u16; 16]) -> Self::Ids {
+        let mut wide = [0; 16];
+        for lane in 0..16 {
+            wide[lane] = i32::from(ids[lane]);
+        }
+        Self::ids_load(&wide)
+    }
+
+    /// Every lane shifted right by `BITS`; zeros come in.
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids {
+        let mut ids = Self::ids_store(ids);
+        for id in &mut ids {
+            *id = ((*id as u32) >> BITS) as i32;
+        }
+        Self::ids_load(&ids)
+    }
+
+    /// Lane `i` becomes lane `ids[i] & 15`.
+    #[inline(always)]
+    fn pick(self, ids: Self::Ids) -> Self {
+        let (values, ids) = (self.store(), Self::ids_store(ids));
+        let mut picked = [0.0; 16];
+        for lane in 0..16 {
+            picked[lane] = values[(ids[lane] & 15) as usize];
+        }
+        Self::load(&picked)
+    }
+
     /// Writes the lanes whose bit is set in `bits` one behind the other. What follows them in `to` means nothing.
     #[inline(always)]
     fn compact(self, bits: u32, to: &mut [f32; 16]) {

@@ -155,6 +155,16 @@ fn check_sixteen<L: Sixteen>() {
     let greatest = std::array::from_fn(|lane| four(lane).iter().copied().fold(f32::NEG_INFINITY, f32::max));
     assert_eq!(L::least_of_fours(&vectors).store(), least);
     assert_eq!(L::greatest_of_fours(&vectors).store(), greatest);
+    for bits in 0..256u32 {
+        // Numbers beyond the lanes show that only the low bits count.
+        let places: [i32; 16] = std::array::from_fn(|i| (bits.wrapping_mul(2654435761) >> i) as i32);
+        let ids = L::ids_load(&places);
+        let picked = places.map(|place| scrambled[1][(place & 15) as usize]);
+        assert_eq!(vectors[1].pick(ids).store(), picked);
+        assert_eq!(L::ids_store(L::ids_shift::<5>(ids)), places.map(|place| (place as u32 >> 5) as i32));
+        let narrow = places.map(|place| place as u16);
+        assert_eq!(L::ids_store(L::ids_widen(&narrow)), narrow.map(i32::from));
+    }
     for part in 0..4 {
         let spread = std::array::from_fn(|lane| scrambled[0][4 * part + lane / 4]);
         assert_eq!(vectors[0].spread(part).store(), spread);

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::geometry::triangle::fast::Projected;
 use crate::geometry::triangle::{Exact, Fast, Watertight};
 use crate::geometry::{Aabb, Accuracy, Hit, Ray};
-use crate::kdtree::{BuildParams, BuildProgress, KdTree, TreeStats};
+use crate::kdtree::{BuildParams, BuildProgress, KdTree, Pools, TreeStats};
 use crate::mesh::Mesh;
 use crate::simd::{Chosen, Isa};
 use rayon::prelude::*;
@@ -110,9 +110,17 @@ impl Accel {
         self.chosen
     }
 
-    /// Bytes of what the chosen accuracies keep beside the tree: none but for [`Accuracy::Fast`].
+    /// Bytes of what is kept beside the tree: for [`Accuracy::Fast`], and for [pools](Self::make_pools).
     pub fn record_bytes(&self) -> usize {
-        size_of_val(&self.projected[..])
+        size_of_val(&self.projected[..]) + self.pool_bytes()
+    }
+
+    /// Bytes of pools, if they have been made.
+    pub fn pool_bytes(&self) -> usize {
+        match &self.storage {
+            Storage::Resident(tree) => tree.pools().map_or(0, Pools::bytes),
+            Storage::Cached(_) => 0,
+        }
     }
 
     /// The accuracy in use.
@@ -190,6 +198,17 @@ impl Accel {
                 self.chosen.run(ResidentInMode::<Q, Watertight> { query, tree: triangles });
             }
             Accuracy::Exact => self.chosen.run(ResidentInMode::<Q, Exact> { query, tree: triangles }),
+        }
+    }
+
+    /// The same for one that knows no fast mode. Panics in that mode, too.
+    pub(super) fn ask_closed<Q: ResidentQuery>(&self, query: Q) {
+        let tree = self.tree();
+        let tree = Resident { tree, records: tree.triangles() };
+        match self.accuracy {
+            Accuracy::Fast => panic!("the fast mode has none of this"),
+            Accuracy::Watertight => self.chosen.run(ResidentInMode::<Q, Watertight> { query, tree }),
+            Accuracy::Exact => self.chosen.run(ResidentInMode::<Q, Exact> { query, tree }),
         }
     }
 

@@ -20,6 +20,7 @@ mod lanes;
 mod many;
 mod pack;
 mod packet;
+mod pool;
 mod query;
 mod range;
 mod ready;

@@ -199,9 +199,14 @@ fn threads_packets_and_instruction_sets_change_nothing() {
     place.write("many.npy", npy(&rows));
     cast(&place, "--rays many.npy -o expected.npz");
     let expected = place.read("expected.npz");
-    for tuning in
-        ["--threads 1 --packet 1", "--threads 3 --packet 4", "--threads 0 --packet 8", "--packet 16"]
-    {
+    for tuning in [
+        "--threads 1 --packet 1",
+        "--threads 3 --packet 4",
+        "--threads 0 --packet 8",
+        "--packet 16",
+        "--pools",
+        "--pools --packet 64",
+    ] {
         cast(&place, &format!("--rays many.npy -o other.npz {tuning}"));
         assert!(place.read("other.npz") == expected, "{tuning}");
     }
@@ -286,7 +291,10 @@ fn hits_are_the_same_within_the_memory_given() {
 #[test]
 fn the_report_says_how_it_went() {
     let place = square();
+    let text = cast(&place, "--rays rays.npy -o hits.npz --threads 1 --pools");
+    assert!(text.contains("\npools      "), "{text}");
     let text = cast(&place, "--rays rays.npy -o hits.npz --threads 1");
+    assert!(!text.contains("\npools      "), "{text}");
     for expected in ["square.obj", "rays       14, ", "watertight", "(chosen)", "1 thread", "closest hit"] {
         assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
     }
@@ -405,6 +413,8 @@ fn options_without_sense_are_refused() {
         ("--threads 1025", "--threads: 1025"),
         ("--accuracy precise", "--accuracy: \"precise\""),
         ("--profile nowhere", "--profile: there is no"),
+        ("--pools --accuracy fast", "--pools: --accuracy fast has no use for them"),
+        ("--pools --memory 1GiB", "--pools: --memory does not count them"),
     ] {
         fail(&place, &format!("square.obj --rays rays.npy -o hits.npz {option}"), &[expected]);
     }

@@ -19,15 +19,16 @@ const BRUTE: usize = 2_000_000;
 /// Larger meshes' trees are not validated: their builder is the same.
 const VALIDATED: usize = 4_000;
 
-/// The place of the fine tree among a scene's trees.
+/// The places of the fine tree among a scene's trees, and of the same with pools.
 const FINE: usize = 1;
+const POOLED: usize = 2;
 
 /// A mesh and its trees.
 pub struct Scene {
     pub name: String,
     pub seed: u64,
     pub mesh: Mesh,
-    trees: [Accel; 2],
+    trees: [Accel; 3],
 }
 
 /// Hits of each mode, in the order of `Accuracy::ALL`.
@@ -50,12 +51,12 @@ struct Way {
 }
 
 impl Scene {
-    /// Builds two trees: as a user would, and with as many planes and as small leaves as it will
-    /// give, which has the most ways to lose a hit.
+    /// Builds three trees: as a user would, and with as many planes and as small leaves as it will
+    /// give, which has the most ways to lose a hit; that one with pools, too.
     pub fn new(name: impl Into<String>, seed: u64, mesh: Mesh) -> Self {
         let name = name.into();
         let fine = BuildParams { traversal_cost: 0.1, min_leaf: 1, exact_below: 64, ..Default::default() };
-        let trees = [BuildParams::default(), fine].map(|params| {
+        let trees = [BuildParams::default(), fine.clone(), fine].map(|params| {
             let accel = Accel::build(&mesh, &params)
                 .unwrap_or_else(|error| panic!("{name}, RAYPACK_SEED={seed}: {error}"));
             if mesh.triangles.len() <= VALIDATED {
@@ -64,6 +65,7 @@ impl Scene {
             }
             accel
         });
+        trees[POOLED].make_pools().unwrap_or_else(|error| panic!("{name}, RAYPACK_SEED={seed}: {error}"));
         Self { name, seed, mesh, trees }
     }
 
@@ -139,11 +141,11 @@ impl Scene {
             self.trees[tree].set_accuracy(accuracy);
             for isa in Isa::available() {
                 self.trees[tree].set_isa(isa);
-                for kernel in Kernel::ALL {
+                for kernel in kernels_of(tree, accuracy) {
                     let way = Way { accuracy, kernel, isa, what: "the rays" };
                     self.compare(tree, way, rays, expected);
                     // The fine tree has the most ways to go wrong.
-                    if tree == FINE {
+                    if tree == FINE || tree == POOLED {
                         self.compare(tree, Way { what: "shuffled", ..way }, &mixed, &mixed_expected);
                         self.compare(tree, Way { what: "from t to t", ..way }, &pinned, &mixed_expected);
                     }
@@ -164,7 +166,7 @@ impl Scene {
                     way.kernel,
                     way.isa,
                     way.what,
-                    ["default", "fine"][tree],
+                    ["default", "fine", "pooled"][tree],
                     self.seed,
                     show(ray),
                     hits[i],
@@ -173,6 +175,15 @@ impl Scene {
                 );
             }
         }
+    }
+}
+
+/// The kernels that trace through a tree as through no other.
+fn kernels_of(tree: usize, accuracy: Accuracy) -> Vec<Kernel> {
+    match (tree, accuracy) {
+        (POOLED, Accuracy::Fast) => vec![],
+        (POOLED, _) => vec![Kernel::Stream],
+        _ => Kernel::ALL.into(),
     }
 }
 

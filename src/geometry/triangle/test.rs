@@ -97,6 +97,20 @@ impl<L: Eight> Finds<L> {
     }
 }
 
+/// What rays find of triangles, one of each in a lane.
+pub struct Own<const W: usize, L: Lanes<W>> {
+    /// A bit for each lane whose triangle is hit between its ray's ends.
+    pub hits: u32,
+    /// A bit for each lane of which [`test`](Test::test) has yet to say whether it is.
+    pub open: u32,
+    /// The ray's parameter, as [`test`](Test::test) gives it, in the lanes of `hits`.
+    pub t: L,
+    /// The barycentric weight of the second corner, likewise.
+    pub u: L,
+    /// That of the third.
+    pub v: L,
+}
+
 /// The lanes of a packet that may have hit a triangle.
 pub struct Candidate<const W: usize, L: Lanes<W>> {
     /// Lanes in which the line meets the triangle: `t` is not compared with anything yet.
@@ -125,12 +139,27 @@ pub trait Mode {
     /// Whether its test says of every ray that passes the edges by more than the error bounds of
     /// [`Placed`] on which side it does.
     const SURE: bool;
+    /// Whether signs of edge functions that are not zero decide.
+    const SIGNS: bool;
     /// What is kept of each triangle.
     type Record: Send + Sync;
     /// The test for `W` rays in lanes `L`.
     type Test<const W: usize, L: Lanes<W>>: Test<W, L, Record = Self::Record>;
     /// The test for one ray.
     type Alone: Alone<Record = Self::Record>;
+
+    /// Each lane's ray against a triangle of its own, from `tnear` to `tfar`: the numbers of a [`Triangle`] in
+    /// lanes, three corners and the plane.
+    #[inline(always)]
+    fn meet_own<const W: usize, L: Lanes<W>>(
+        _test: &Self::Test<W, L>,
+        _triangles: &[Lanes3<L>; 4],
+        _tnear: L,
+        _tfar: L,
+    ) -> Own<W, L> {
+        let zero = L::splat(0.0);
+        Own { hits: 0, open: u32::MAX, t: zero, u: zero, v: zero }
+    }
 }
 
 /// [`Accuracy::Fast`] as a type.
@@ -148,6 +177,7 @@ pub struct Exact;
 impl Mode for Fast {
     const ACCURACY: Accuracy = Accuracy::Fast;
     const SURE: bool = false;
+    const SIGNS: bool = false;
     type Record = super::fast::Projected;
     type Test<const W: usize, L: Lanes<W>> = super::fast::Lines<W, L>;
     type Alone = super::fast::Lines<1, f32>;
@@ -156,14 +186,26 @@ impl Mode for Fast {
 impl Mode for Watertight {
     const ACCURACY: Accuracy = Accuracy::Watertight;
     const SURE: bool = true;
+    const SIGNS: bool = true;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::watertight::Shear<W, L>;
     type Alone = super::watertight::Shear<1, f32>;
+
+    #[inline(always)]
+    fn meet_own<const W: usize, L: Lanes<W>>(
+        test: &Self::Test<W, L>,
+        triangles: &[Lanes3<L>; 4],
+        tnear: L,
+        tfar: L,
+    ) -> Own<W, L> {
+        test.meet_own(triangles, tnear, tfar)
+    }
 }
 
 impl Mode for Exact {
     const ACCURACY: Accuracy = Accuracy::Exact;
     const SURE: bool = true;
+    const SIGNS: bool = false;
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
     type Alone = super::exact::Filter<1, f32>;

@@ -5,6 +5,7 @@
 //! more memory is in use than the references need.
 
 use super::binned::{self, Extent, Frame, Table};
+use super::clear::Gap;
 use super::exact::Event;
 use super::partition::Divider;
 use super::reference::Reference;
@@ -131,8 +132,22 @@ fn leaf(context: &Context, chunks: Chunks, place: &Place) -> Part {
     Part::Whole(Subtree::leaf(ids))
 }
 
-/// The cheapest plane found; `None` if none divides.
+/// The cheapest plane found, clear of what it parts; `None` if none divides.
 pub fn best_split<G: Gather>(
+    isa: Chosen,
+    params: &BuildParams,
+    references: &G,
+    count: usize,
+    costs: &CellCost,
+) -> Result<Option<Split>, G::Error> {
+    let Some(split) = cheapest_split(isa, params, references, count, costs)? else { return Ok(None) };
+    let beside = |gap: Gap, chunk: &[Reference]| gap.beside(&split, chunk);
+    let gap = references.gather(|| Gap::ALL, beside, Gap::and)?;
+    Ok(Some(gap.clear(split, costs)))
+}
+
+/// The cheapest plane found; `None` if none divides.
+fn cheapest_split<G: Gather>(
     isa: Chosen,
     params: &BuildParams,
     references: &G,

@@ -10,6 +10,7 @@
 //! depends on the triangles alone, so the tree is the same for any number of threads.
 
 mod binned;
+mod clear;
 mod exact;
 mod few;
 pub(super) mod large;
@@ -117,6 +118,8 @@ pub(super) struct Context<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub cell: Aabb,
+    /// How far planes keep away from what they part.
+    clearance: f32,
     pub depth: usize,
     /// Splits in a row that cost more than a leaf.
     bad_splits: u32,
@@ -145,7 +148,7 @@ impl Context<'_> {
         if count <= self.params.min_leaf || place.depth >= self.depth_limit || self.ledger.is_over() {
             return None;
         }
-        CellCost::new(self.params, place.cell)
+        CellCost::new(self.params, place.cell, place.clearance)
     }
 
     /// Whether a split is better than a leaf, or may be tried all the same.
@@ -193,7 +196,8 @@ impl Place {
     /// The root's, of a tree of so many triangles.
     pub fn of_root(bounds: Aabb, triangles: usize, budget: usize) -> Self {
         let in_flight = (triangles as f64 * IN_FLIGHT) as usize;
-        Self { cell: bounds, depth: 0, bad_splits: 0, budget, in_flight, share: 1.0 }
+        let clearance = clear::clearance(&bounds);
+        Self { cell: bounds, clearance, depth: 0, bad_splits: 0, budget, in_flight, share: 1.0 }
     }
 
     /// The places of the children, with so many references below and above, of a node of `count`; `None`
@@ -222,6 +226,7 @@ impl Place {
             let spare = (self.budget - total - 2 * NODES_PER_LEAF) as f64;
             Self {
                 cell,
+                clearance: self.clearance,
                 depth: self.depth + 1,
                 bad_splits,
                 budget: references + NODES_PER_LEAF + (spare * part) as usize,

@@ -5,6 +5,7 @@
 //! follow.
 
 use super::binned::{self, Extent, Frame, Table};
+use super::clear::Gap;
 use super::exact::{self, Event};
 use super::few::{self, Few};
 use super::partition::Divider;
@@ -63,8 +64,19 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// The cheapest plane found for a small node; `None` if none divides.
+    /// The cheapest plane found for a small node, clear of what it parts; `None` if none divides.
     fn best_split(&mut self, context: &Context, references: &[Reference], costs: &CellCost) -> Option<Split> {
+        let split = self.cheapest_split(context, references, costs)?;
+        Some(Gap::ALL.beside(&split, references).clear(split, costs))
+    }
+
+    /// The cheapest plane found.
+    fn cheapest_split(
+        &mut self,
+        context: &Context,
+        references: &[Reference],
+        costs: &CellCost,
+    ) -> Option<Split> {
         let (count, params) = (references.len(), context.params);
         if count >= params.exact_below.max(2) {
             let mut extent = Extent::NONE;

@@ -116,6 +116,8 @@ pub struct Options {
     /// Whether every kernel is given rays in a row, as `raypack cast` has them, and makes packets of them while the clock
     /// runs.
     pub slices: bool,
+    /// Whether raypack keeps pools beside its tree.
+    pub pools: bool,
 }
 
 /// Measures. `progress` is told, a line at a time, what is about to happen.
@@ -128,6 +130,10 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
     progress("building raypack's tree");
     let mut ours = Ours::new(mesh, &options.build, options.isa, options.accuracy)?;
     ours.give_slices(options.slices);
+    if options.pools {
+        progress("making raypack's pools");
+        ours.make_pools()?;
+    }
     let mut notes = Vec::new();
     let mut peers: Vec<(EngineName, Box<dyn Engine>)> = Vec::new();
     for &name in options.engines.iter().filter(|&&name| name != EngineName::Raypack) {
@@ -172,6 +178,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             camera: setup.camera.to_string(),
             size: options.size,
             slices: options.slices,
+            pools: options.pools,
             light: setup.light.to_array(),
         },
         rows: Vec::new(),

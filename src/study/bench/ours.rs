@@ -46,6 +46,17 @@ impl Ours {
         Self { accel, build_seconds, stats, slices: false }
     }
 
+    /// Makes pools beside the tree; that counts as a part of the build.
+    ///
+    /// # Errors
+    /// As [`Accel::make_pools`].
+    pub fn make_pools(&mut self) -> Result<()> {
+        let start = Instant::now();
+        self.accel.make_pools()?;
+        self.build_seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
     /// Whether all kernels are given rays in a row, and give records ray by ray.
     pub fn give_slices(&mut self, slices: bool) {
         self.slices = slices;

@@ -52,6 +52,8 @@ pub struct Header {
     pub size: u32,
     /// Whether all of raypack's kernels were given rays in a row.
     pub slices: bool,
+    /// Whether raypack kept pools beside its tree, counted with it.
+    pub pools: bool,
     /// The point light.
     pub light: [f32; 3],
 }

@@ -19,7 +19,8 @@ impl fmt::Display for Report {
         writeln!(f, "{}, {}", engines.join(", "), h.date)?;
         if h.engines.iter().any(|e| e.name == "raypack") {
             let given = if h.slices { "; all kernels are given rays in a row" } else { "" };
-            writeln!(f, "raypack's accuracy: {}{given}", h.accuracy)?;
+            let pools = if h.pools { "; pools are kept beside the tree" } else { "" };
+            writeln!(f, "raypack's accuracy: {}{given}{pools}", h.accuracy)?;
         }
         writeln!(f, "\nMillion rays a second, median of the rounds; the best mode of each engine\n")?;
         write!(f, "{}", grid(&self.summary()))?;

@@ -37,7 +37,7 @@ use crate::geometry::{Hit, Ray};
 use crate::kdtree::{Exit, KdTree, Tree};
 use crate::simd::{Simd, prefetch};
 use flight::{Flight, NONE};
-use group::Group;
+pub use group::{Begun, Group};
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 use step::{END, Waiting, step};
@@ -128,30 +128,36 @@ impl OneByOne for Any<'_> {
 
 /// Some of the rays in flight, a bit for each: those that wait for the same work. It stays in a register.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Set(u32);
+pub struct Set(u32);
 
 const _: () = assert!(IN_FLIGHT == u32::BITS as usize);
 
 impl Set {
-    const NONE: Self = Self(0);
-    const ALL: Self = Self(u32::MAX);
+    pub const NONE: Self = Self(0);
+    pub const ALL: Self = Self(u32::MAX);
 
     /// Puts a ray there if it is to be there.
     #[inline(always)]
-    fn put_if(&mut self, flight: usize, wanted: bool) {
+    pub fn put_if(&mut self, flight: usize, wanted: bool) {
         self.0 |= u32::from(wanted) << (flight % IN_FLIGHT);
     }
 
     /// Takes out the first that is there.
     #[inline(always)]
-    fn pop(&mut self) -> Option<usize> {
+    pub fn pop(&mut self) -> Option<usize> {
         let first = (self.0 != 0).then(|| self.0.trailing_zeros() as usize % IN_FLIGHT);
         self.0 &= self.0.wrapping_sub(1);
         first
     }
 
+    /// What is there and not in another.
     #[inline(always)]
-    const fn len(self) -> usize {
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    #[inline(always)]
+    pub const fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 }
@@ -190,11 +196,21 @@ pub fn trace<S: Simd, M: Mode, A: OneByOne>(
     rays: &[Ray],
     answers: &mut A,
 ) {
-    // Taken out, not borrowed: a closure would be compiled without the instruction set.
+    with_stacks(
+        #[inline(always)]
+        |stacks| fly::<S, M, A>(resident, rays, answers, stacks),
+    );
+}
+
+/// Has something done with the thread's stacks.
+#[inline(always)]
+pub fn with_stacks<R>(fly: impl FnOnce(&mut [Waiting; IN_FLIGHT]) -> R) -> R {
+    // Taken out, not borrowed: a closure of the library's would be compiled without the instruction set.
     let mut stacks = STACKS.take();
     stacks.resize(IN_FLIGHT, Waiting::new());
-    fly::<S, M, A>(resident, rays, answers, stacks.first_chunk_mut().expect("as many as rays"));
+    let done = fly(stacks.first_chunk_mut().expect("as many as rays"));
     STACKS.set(stacks);
+    done
 }
 
 #[inline(always)]

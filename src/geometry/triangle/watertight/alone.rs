@@ -1,13 +1,13 @@
-//! One ray against eight triangles at once.
+//! One ray against eight triangles at once, and each ray against a triangle of its own.
 //!
-//! Lanes hold triangles instead of rays. What is computed in a lane is what the test of one triangle computes,
+//! Lanes hold triangles instead of rays, or both. What is computed in a lane is what the test of one triangle computes,
 //! operation by operation, so it has the same bits. What that test seldom does (signs in double precision,
 //! clipping rays that graze the plane, triangles without area) is left to it.
 
 use super::distance::are_clipped;
-use super::{Shear, likely};
-use crate::geometry::triangle::{Alone, Finds, Lanes3, RENAMED, Triangle};
-use crate::simd::{Eight, Mask};
+use super::{Shear, edges, likely, one_sign};
+use crate::geometry::triangle::{Alone, Finds, Lanes3, Own, RENAMED, Triangle};
+use crate::simd::{Eight, Lanes, Mask};
 
 /// Eight triangles' coordinates, a row for each: three for each corner, then the plane's. The fourth row of each
 /// three is there for an index of two bits to need no check.
@@ -69,40 +69,106 @@ impl Alone for Shear<1, f32> {
     fn find<L: Eight>(&self, triangles: &[&Triangle; 8], tnear: f32, tfar: f32) -> Finds<L> {
         let [p0, p1, p2, plane] = columns::<L>(triangles);
         let corner = self.translated_eight::<L>(&p0);
-        let [ax, ay, az] = self.shear_eight(corner);
-        let [bx, by, bz] = self.shear_eight(self.translated_eight::<L>(&p1));
-        let [cx, cy, cz] = self.shear_eight(self.translated_eight::<L>(&p2));
+        let [dx, dy, dz] = self.direction;
+        let seen = Seen {
+            corner,
+            sheared: [
+                self.shear_eight(corner),
+                self.shear_eight(self.translated_eight::<L>(&p1)),
+                self.shear_eight(self.translated_eight::<L>(&p2)),
+            ],
+            normal: self.renamed_eight::<L>(&plane),
+            direction: [L::splat(dx), L::splat(dy), L::splat(dz)],
+            scale: L::splat(self.shear[2]),
+        };
+        let Met { hits, open, t, .. } = seen.meet(L::splat(tnear), L::splat(tfar));
+        Finds { hits, t, open: open.bits() }
+    }
+}
 
-        // As in `decide`.
-        let a = cx * by - cy * bx;
-        let b = ax * cy - ay * cx;
-        let c = bx * ay - by * ax;
-        let zero = L::splat(0.0);
-        let inside = !(a.min(b).min(c).lt(zero) & zero.lt(a.max(b).max(c)));
+/// Rays and triangles, one of each in a lane, as the rays see them.
+pub(super) struct Seen<L> {
+    /// The first corner, translated.
+    pub corner: Lanes3<L>,
+    /// The corners, translated and sheared.
+    pub sheared: [Lanes3<L>; 3],
+    /// The plane's normal, and the ray's direction, renamed.
+    pub normal: Lanes3<L>,
+    pub direction: Lanes3<L>,
+    /// `1 / dz`.
+    pub scale: L,
+}
+
+/// What each lane's ray finds of its triangle.
+pub(super) struct Met<const W: usize, L: Lanes<W>> {
+    /// Where it is hit, at `t`.
+    pub hits: L::Mask,
+    /// Where the test of one triangle has yet to say whether it is.
+    pub open: L::Mask,
+    pub t: L,
+    /// The edge functions opposite to the corners, and their sum.
+    pub edges: Lanes3<L>,
+    pub sum: L,
+}
+
+impl<L> Seen<L> {
+    /// What is hit from `tnear` to `tfar`.
+    #[inline(always)]
+    pub fn meet<const W: usize>(self, tnear: L, tfar: L) -> Met<W, L>
+    where
+        L: Lanes<W>,
+    {
+        let Self { corner: [px, py, pz], sheared, normal: [nx, ny, nz], direction: [dx, dy, dz], scale } =
+            self;
+        // As in `edge_functions`.
+        let edges = edges(&sheared);
+        let inside = one_sign(&edges);
 
         // `t` is kept between these.
-        let scale = L::splat(self.shear[2]);
-        let [depth_a, depth_b, depth_c] = [az, bz, cz];
+        let [[_, _, az], [_, _, bz], [_, _, cz]] = sheared;
         let (az, bz, cz) = (scale * az, scale * bz, scale * cz);
         let (nearest, farthest) = (az.min(bz).min(cz), az.max(bz).max(cz));
-        let inside = inside & nearest.le(L::splat(tfar)) & L::splat(tnear).le(farthest);
+        let inside = inside & nearest.le(tfar) & tnear.le(farthest);
 
         // As in `meet_plane`.
-        let [nx, ny, nz] = self.renamed_eight::<L>(&plane);
-        let [px, py, pz] = corner;
         let height = nx * px + ny * py + nz * pz;
-        let [dx, dy, dz] = self.direction;
-        let speed = nx * L::splat(dx) + ny * L::splat(dy) + nz * L::splat(dz);
+        let speed = nx * dx + ny * dy + nz * dz;
         let t = (height / speed).max(nearest).min(farthest);
 
         // A triangle without area has a plane of zeros, and so no speed.
-        let sheared = [[ax, ay, depth_a], [bx, by, depth_b], [cx, cy, depth_c]];
-        let clipped = are_clipped(inside, &sheared, &[a, b, c], speed, L::splat(dz.abs()));
+        let clipped = are_clipped(inside, &sheared, &edges, speed, dz.abs());
+        let zero = L::splat(0.0);
+        let [a, b, c] = edges;
         let open = inside & (clipped | a.eq(zero) | b.eq(zero) | c.eq(zero));
         let sum = a + b + c;
         let hits = inside & !open & (sum.lt(zero) | zero.lt(sum));
-        let hits = hits & L::splat(tnear).le(t) & t.le(L::splat(tfar));
-        Finds { hits, t, open: open.bits() }
+        let hits = hits & tnear.le(t) & t.le(tfar);
+        Met { hits, open, t, edges, sum }
+    }
+}
+
+impl<const W: usize, L: Lanes<W>> Shear<W, L> {
+    /// Each lane's ray against a triangle of its own.
+    #[inline(always)]
+    pub(crate) fn meet_own(&self, triangles: &[Lanes3<L>; 4], tnear: L, tfar: L) -> Own<W, L> {
+        let [a, b, c, normal] = triangles;
+        let (a, b, c) = (self.moved(a), self.moved(b), self.moved(c));
+        let seen = Seen {
+            corner: a,
+            sheared: [self.shear(a), self.shear(b), self.shear(c)],
+            normal: self.renamed(normal),
+            direction: self.direction,
+            scale: self.shear[2],
+        };
+        let Met { hits, open, t, edges: [_, b, c], sum } = seen.meet(tnear, tfar);
+        Own { hits: hits.bits(), open: open.bits(), t, u: b / sum, v: c / sum }
+    }
+
+    /// Each lane's point relative to its origin, renamed.
+    #[inline(always)]
+    fn moved(&self, point: &Lanes3<L>) -> Lanes3<L> {
+        let [x, y, z] = self.renamed(point);
+        [x - self.origin[0], y - self.origin[1], z - self.origin[2]]
     }
 }
 
@@ -110,7 +176,6 @@ impl Alone for Shear<1, f32> {
 mod tests {
     use super::*;
     use crate::geometry::triangle::{Corners, Test};
-    use crate::simd::Lanes;
     use crate::simd::{Chosen, Isa, Simd, Task};
     use proptest::prelude::*;
 

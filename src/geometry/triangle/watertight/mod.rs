@@ -18,6 +18,7 @@
 mod alone;
 mod distance;
 mod placed;
+pub mod pooled;
 
 use super::{Candidate, Corners, Lanes3, Placed, RENAMED, Test, Triangle};
 use crate::simd::{Lanes, Mask};

@@ -1,0 +1,268 @@
+//! One ray against the sixteen triangles of a pool at once.
+//!
+//! What is asked here is not yet whether the ray hits, and where, to the bit: that is the mode's own test to say, of the one
+//! or two triangles that are left in the end. It is which triangles the ray may hit, which of them it hits for certain, and
+//! between which bounds `t` lies.
+//!
+//! **Whether it hits.** Vertices are translated and sheared as the watertight test does it, operation by operation, each of
+//! them once; corners are taken from them, and the edge functions have the same bits as that test's. A triangle with edge functions
+//! of both signs is missed. One whose edge functions are of one sign, none of them zero, is hit for certain.
+//!
+//! **Where.** With `u = 2^-24` and `R` the greatest coordinate distance from the origin to the scene's bounds, sheared
+//! coordinates are off by at most `6u R` (see `likely`), so with `S` the sum of the magnitudes of all sheared coordinates of a
+//! triangle, each edge function is off by at most `10u R (S + 8u R)`. `t` is the mean of the corners' depths weighted by
+//! edge functions: it is off by `48u R (S + 8u R) span / |sum|` because of them, where `span` is the distance between the nearest
+//! depth and the farthest, and by some `10u R / |dz|` because depths are rounded, and it is. What a test answers is off likewise:
+//! by up to `30u R / (s |dz|)` for a plane that the ray meets at a speed `s` relative to the greatest component of the
+//! normal (see `distance`). That component is at most `|sum| + 4 S span |dz|`, of which `s` is `|sum|`, so this is
+//! `30u R / |dz| + 120u R S span / |sum|`. The bounds here allow for half as much again as both together. Where `sum` is
+//! so small that this means nothing, the depths themselves are bounds: `t` is kept between them.
+
+use super::Shear;
+use crate::geometry::triangle::{RENAMED, Test};
+use crate::simd::Sixteen;
+
+/// `64u`, for what does not depend on the triangle.
+const SLACK: f32 = 1.0 / (1 << 18) as f32;
+/// `256u`, for what grows with the triangle as the ray sees it.
+const BLUR: f32 = 1.0 / (1 << 16) as f32;
+/// `16u`, for edge functions.
+const DOUBT: f32 = 1.0 / (1 << 20) as f32;
+
+/// A ray as pools see it.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct Pooled {
+    /// The origin and the shear, in renamed coordinates.
+    origin: [f32; 3],
+    shear: [f32; 3],
+    /// What the coordinates are renamed by: `RENAMED` of the greatest axis.
+    axes: [u8; 4],
+    /// How far the scene reaches from the origin.
+    reach: f32,
+}
+
+/// What a ray may find in sixteen triangles.
+pub struct Prospects<L: Sixteen> {
+    /// Triangles that it may hit between its ends.
+    pub possible: L::Mask,
+    /// Those that it hits there for certain.
+    pub certain: L::Mask,
+    /// `t` lies between this, where it may hit,
+    pub first: L,
+    /// and this.
+    pub last: L,
+}
+
+/// Sixteen triangles, by their vertices.
+pub struct Sixteens<'a> {
+    /// The vertices' coordinates, in the order of [`Pooled::renamed`].
+    pub rows: [&'a [f32; 16]; 3],
+    /// Each triangle's vertices, in bits 0 to 3, 4 to 7 and 8 to 11.
+    pub corners: &'a [u16; 16],
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Pooled {
+    /// Prepares a ray from whose origin the scene reaches so far.
+    #[inline(always)]
+    pub fn new(origin: &[f32; 3], direction: &[f32; 3], reach: f32) -> Self {
+        let Shear { origin, shear, major, .. } = Shear::<1, f32>::new(origin, direction, 1);
+        let [i, j, k] = RENAMED[major.unwrap_or(2)].map(|axis| axis as u8);
+        Self { origin, shear, axes: [i, j, k, 0], reach }
+    }
+
+    /// Which of the coordinates `x`, `y` and `z` take the places of those.
+    #[inline(always)]
+    pub fn renamed(&self) -> [usize; 3] {
+        let [i, j, k, _] = self.axes.map(usize::from);
+        [i, j, k]
+    }
+
+    /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
+    /// zero; otherwise they are if those are beyond their error bounds.
+    #[inline(always)]
+    pub fn prospects<L: Sixteen, const SIGNS: bool>(
+        &self,
+        triangles: &Sixteens<'_>,
+        tnear: f32,
+        tfar: f32,
+    ) -> Prospects<L> {
+        // Each vertex translated and sheared, as the ray sees it.
+        let [i, j, k] = triangles.rows;
+        let [ox, oy, oz] = self.origin;
+        let [sx, sy, scale] = self.shear;
+        let z = L::load(k) - L::splat(oz);
+        let x = (L::load(i) - L::splat(ox)) - L::splat(sx) * z;
+        let y = (L::load(j) - L::splat(oy)) - L::splat(sy) * z;
+        let depth = L::splat(scale) * z;
+        let size = x.abs() + y.abs();
+
+        // The corners, and the edge functions opposite to them.
+        let a = L::ids_widen(triangles.corners);
+        let (b, c) = (L::ids_shift::<4>(a), L::ids_shift::<8>(a));
+        let (ax, bx, cx) = (x.pick(a), x.pick(b), x.pick(c));
+        let (ay, by, cy) = (y.pick(a), y.pick(b), y.pick(c));
+        let (depth_a, depth_b, depth_c) = (depth.pick(a), depth.pick(b), depth.pick(c));
+        let size = size.pick(a) + size.pick(b) + size.pick(c);
+        let (a, b, c) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+
+        // Whether it may hit, and whether it does.
+        let reach = L::splat(self.reach);
+        let size = reach * (size + L::splat(DOUBT) * reach);
+        let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
+        let doubt = if SIGNS { L::splat(0.0) } else { L::splat(DOUBT) * size };
+        let (below, above) = (least.lt(L::splat(0.0) - doubt), doubt.lt(greatest));
+        let sure = doubt.lt(least) | greatest.lt(L::splat(0.0) - doubt);
+        let present = L::mask_from_bits((1 << triangles.count.min(16)) - 1);
+
+        // Where.
+        let (nearest, farthest) = (depth_a.min(depth_b).min(depth_c), depth_a.max(depth_b).max(depth_c));
+        let share = L::splat(1.0) / (a + b + c);
+        let t = c.mul_add(depth_c, b.mul_add(depth_b, a * depth_a)) * share;
+        let error = L::splat(BLUR) * size * (farthest - nearest) * share.abs();
+        let slack = L::splat(SLACK * self.reach * scale.abs());
+        let first = (t - error).max(nearest) - slack;
+        let last = (t + error).min(farthest) + slack;
+
+        let (tnear, tfar) = (L::splat(tnear), L::splat(tfar));
+        let possible = present & !(below & above) & first.le(tfar) & tnear.le(last);
+        let certain = possible & sure & tnear.le(first) & last.le(tfar);
+        Prospects { possible, certain, first, last }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::triangle::exact::Filter;
+    use crate::geometry::triangle::{Candidate, Corners, Triangle};
+    use crate::simd::{Chosen, Isa, Lanes, Mask, Simd, Task};
+    use proptest::prelude::*;
+
+    struct Ask<'a, const SIGNS: bool>(&'a Pooled, &'a Sixteens<'a>, [f32; 2]);
+
+    impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
+        /// Bits of what is possible and of what is certain, and the bounds.
+        type Output = (u32, u32, [f32; 16], [f32; 16]);
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Self::Output {
+            let Self(ray, triangles, [tnear, tfar]) = self;
+            let Prospects { possible, certain, first, last } =
+                ray.prospects::<S::F16, SIGNS>(triangles, tnear, tfar);
+            (possible.bits(), certain.bits(), first.store(), last.store())
+        }
+    }
+
+    /// Five triangles that share no vertex, asked together and one by one: nothing that is hit is impossible, all that is
+    /// certain is hit, and `t` lies between its bounds. How many are hit, and how many of those are certain.
+    fn check(origin: [f32; 3], direction: [f32; 3], corners: &[Corners; 5], ends: [f32; 2]) -> [usize; 2] {
+        let vertices = corners.as_flattened();
+        let mut rows = [[0.0; 16]; 3];
+        for (number, vertex) in vertices.iter().enumerate() {
+            for axis in 0..3 {
+                rows[axis][number] = vertex[axis];
+            }
+        }
+        let reach = (0..3)
+            .flat_map(|axis| vertices.iter().map(move |vertex| (vertex[axis] - origin[axis]).abs()))
+            .fold(0.0, f32::max);
+        let pooled = Pooled::new(&origin, &direction, reach);
+        let numbers: [u16; 16] =
+            std::array::from_fn(|i| ((3 * i) | ((3 * i + 1) << 4) | ((3 * i + 2) << 8)) as u16);
+        let sixteens =
+            Sixteens { rows: pooled.renamed().map(|axis| &rows[axis]), corners: &numbers, count: 5 };
+        let test = Shear::<1, f32>::new(&origin, &direction, 1);
+        let exact = Filter::<1, f32>::new(&origin, &direction, 1);
+        let mut counts = [0; 2];
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            let by_signs = chosen.run(Ask::<true>(&pooled, &sixteens, ends));
+            let by_bounds = chosen.run(Ask::<false>(&pooled, &sixteens, ends));
+            for (lane, corners) in corners.iter().enumerate() {
+                let triangle = Triangle::new(*corners);
+                let answers = [test.test(&triangle, true), exact.test(&triangle, true)];
+                for (Candidate { inside, t, .. }, (possible, certain, first, last)) in
+                    answers.into_iter().zip([by_signs, by_bounds])
+                {
+                    let hit = inside && ends[0] <= t && t <= ends[1];
+                    let [possible, certain] = [possible, certain].map(|bits| bits >> lane & 1 == 1);
+                    let (first, last) = (first[lane], last[lane]);
+                    let about =
+                        format!("{isa}, {origin:?} {direction:?} {corners:?}, t {t}, {first} to {last}");
+                    assert!(possible || !hit, "a hit is impossible: {about}");
+                    assert!(hit || !certain, "what is certain is no hit: {about}");
+                    assert!(!hit || first <= t && t <= last, "t is out of bounds: {about}");
+                    counts[0] += usize::from(hit);
+                    counts[1] += usize::from(certain);
+                }
+            }
+            assert_eq!((by_signs.0 | by_bounds.0) >> 5, 0, "what is not there is impossible");
+        }
+        counts
+    }
+
+    /// Numbers between -1 and 1.
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 0.0f64;
+        move || {
+            state = (state + 0.618_033_988_749_895).fract();
+            (state * 2.0 - 1.0) as f32
+        }
+    }
+
+    #[test]
+    fn hits_are_never_out_of_bounds_and_mostly_certain() {
+        let mut number = numbers();
+        let mut counts = [0; 2];
+        for round in 0..4000 {
+            // Of many sizes and shapes, far away or near, met squarely or grazed, inside or near an edge.
+            let size = 10f32.powi(round % 7 - 3);
+            let away = 10f32.powi(round / 7 % 6 - 2);
+            let thin = 10f32.powi(-(round / 42 % 4));
+            let mut point = |scale: f32| [number() * scale, number() * scale, number() * scale];
+            let direction = point(1.0);
+            let origin = point(away);
+            let corners: [Corners; 5] = std::array::from_fn(|_| {
+                let on_ray = number_of(&mut point);
+                let center: [f32; 3] =
+                    std::array::from_fn(|i| origin[i] + direction[i] * on_ray.abs() * away);
+                let (e, f) = (point(size), point(size));
+                let corner = |by_e: f32, by_f: f32| {
+                    std::array::from_fn(|i| center[i] + e[i] * by_e + (f[i] * thin + e[i] * 0.1) * by_f)
+                };
+                [corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)]
+            });
+            let found = check(origin, direction, &corners, [0.0, f32::MAX]);
+            counts = [counts[0] + found[0], counts[1] + found[1]];
+        }
+        let [hits, certain] = counts;
+        assert!(hits > 10_000 && 3 * certain > 2 * hits, "{certain} of {hits} hits are certain");
+    }
+
+    /// A number out of a point.
+    fn number_of(point: &mut impl FnMut(f32) -> [f32; 3]) -> f32 {
+        point(1.0)[0]
+    }
+
+    proptest! {
+        #[test]
+        fn coarse_triangles_are_in_bounds(
+            first in proptest::array::uniform32(-1.0f32..1.0),
+            second in proptest::array::uniform20(-1.0f32..1.0),
+            round in 0u32..4,
+        ) {
+            // Coarse coordinates make for shared edges, triangles without area and zeros of both signs.
+            let scale = [1e6, 64.0, 4.0, 2.0][round as usize];
+            let all: Vec<f32> = first.iter().chain(&second).map(|x| (x * scale).round() / scale).collect();
+            let point = |i: usize| [all[3 * i], all[3 * i + 1], all[3 * i + 2]];
+            let corners = std::array::from_fn(|i| [point(3 * i), point(3 * i + 1), point(3 * i + 2)]);
+            let (origin, toward) = (point(15), point(16));
+            prop_assume!(toward != [0.0; 3]);
+            check(origin, toward, &corners, [0.0, f32::MAX]);
+            check(origin, toward, &corners, [0.25, 0.75]);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Leaves that hold their triangles' corners, for kernels that meet a leaf with one ray alone.
+//!
+//! A leaf of the tree names its triangles, whose records lie anywhere. For packets, which share what they fetch, that takes the
+//! least memory; but a ray that is alone fetches a line or two of the cache for each triangle, and has to bring their numbers
+//! together. A *pool* is a leaf's vertices side by side, each once, with the numbers of each triangle's three: a ray meets up to
+//! sixteen triangles at once, out of three or four lines of the cache that lie in a row.
+//!
+//! What sixteen cost no more than one of changes what a good leaf is, too: subtrees that hold up to sixteen triangles are
+//! leaves here wherever that is cheaper by the surface-area heuristic. So pools have [lines](super::lines) of their
+//! own, and fewer of them ([`collapse`]).
+//!
+//! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)), and take nearly as much
+//! as the tree again. One ray against as many triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets",
+//! 2008.
+
+mod chunk;
+mod collapse;
+
+pub use chunk::{Chunk, MOST};
+
+use super::lines::{Line, Lines, MAX_LINE, MAX_RECORD};
+use super::{KdTree, Node};
+use crate::geometry::triangle::Triangle;
+use crate::huge;
+use collapse::{Collapsed, Source};
+use rayon::prelude::*;
+
+/// Leaves that hold their corners, and the lines that lead to them.
+#[derive(Debug)]
+pub struct Pools {
+    lines: Lines,
+    /// Chunks, one behind the other; a leaf's in a row.
+    words: Vec<u32>,
+}
+
+impl Pools {
+    /// Makes a tree's; `None` if there are more of them than lines can number.
+    pub(super) fn of_tree(tree: &KdTree) -> Option<Self> {
+        let KdTree { nodes, references, triangles, bounds, .. } = tree;
+        let Collapsed { mut nodes, ids } = Source { nodes, references, triangles }.collapse(bounds);
+        let words = fill(&mut nodes, &ids, triangles);
+        if words.len() > MAX_RECORD {
+            return None;
+        }
+        let lines = Lines::pack(&nodes, &tree.bounds);
+        (lines.all().len() <= MAX_LINE).then_some(Self { lines, words })
+    }
+
+    /// The tree in cache lines; the root is the first. A leaf's record is the place of its first chunk.
+    #[inline(always)]
+    pub fn lines(&self) -> &[Line] {
+        self.lines.all()
+    }
+
+    /// The words of all chunks, with room behind them for as many as a chunk may span.
+    #[inline(always)]
+    pub fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// Memory.
+    pub fn bytes(&self) -> usize {
+        self.lines.bytes() + size_of_val(&self.words[..])
+    }
+}
+
+/// Leaves whose chunks are written at once.
+const LEAVES: usize = 1024;
+
+/// Writes all leaves' chunks and has the leaves name theirs, in the order of a depth-first walk.
+fn fill(nodes: &mut [Node], ids: &[u32], triangles: &[Triangle]) -> Vec<u32> {
+    let mut leaves = Vec::new();
+    let mut stack = vec![0];
+    while let Some(index) = stack.pop() {
+        let node = nodes[index];
+        if !node.is_leaf() {
+            stack.extend([node.below() as usize + 1, node.below() as usize]);
+        } else if !node.references().is_empty() {
+            leaves.push(index);
+        }
+    }
+    let blocks: Vec<(Vec<u32>, Vec<usize>)> = leaves
+        .par_chunks(LEAVES)
+        .map(|leaves| {
+            let (mut words, mut starts) = (Vec::new(), Vec::with_capacity(leaves.len()));
+            for &leaf in leaves {
+                starts.push(words.len());
+                chunk::write(&ids[nodes[leaf].references()], triangles, &mut words);
+            }
+            (words, starts)
+        })
+        .collect();
+    let total: usize = blocks.iter().map(|(words, _)| words.len()).sum();
+    let mut all = huge::room_for(total + chunk::SPAN);
+    for ((words, starts), leaves) in blocks.iter().zip(leaves.chunks(LEAVES)) {
+        for (&leaf, start) in leaves.iter().zip(starts) {
+            // A leaf's record is the word before its first reference.
+            let count = nodes[leaf].references().len();
+            if all.len() + start < MAX_RECORD {
+                nodes[leaf] = Node::leaf(all.len() + start + 1, count);
+            }
+        }
+        all.extend_from_slice(words);
+    }
+    all.resize(total + chunk::SPAN, 0);
+    all
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,72 @@
+//! Rays through the pools of an [`Accel`].
+
+use super::{Told, trace};
+use crate::error::{Error, Result};
+use crate::geometry::triangle::Mode;
+use crate::geometry::{Accuracy, Hit, Ray};
+use crate::kdtree::Pools;
+use crate::simd::Simd;
+use crate::traverse::Accel;
+use crate::traverse::accel::Storage;
+use crate::traverse::query::ResidentQuery;
+use crate::traverse::records::Resident;
+use crate::traverse::stream::{Any, Closest};
+
+impl Accel {
+    /// Makes leaves that hold their corners ([`Pools`]), for streams to go through: rays that have nothing in common are
+    /// traced up to 1.4 times as fast then, and the tree takes nearly twice the memory. Clones share them. Hits are the
+    /// same, to the bit.
+    ///
+    /// # Errors
+    /// Only a part of the scene is in memory, the tree has too many leaves, or the accuracy is
+    /// [`Fast`](Accuracy::Fast), whose test goes its own way.
+    pub fn make_pools(&self) -> Result<()> {
+        if self.accuracy() == Accuracy::Fast {
+            return Err(Error::option("--pools", "the fast accuracy has no use for them"));
+        }
+        match &self.storage {
+            Storage::Cached(_) => Err(Error::option("--pools", "all of the scene has to be in memory")),
+            Storage::Resident(tree) if tree.make_pools() => Ok(()),
+            Storage::Resident(_) => Err(Error::option("--pools", "the tree has too many leaves")),
+        }
+    }
+
+    /// The pools if they have been made and rays can go through them.
+    #[inline(always)]
+    pub(in crate::traverse) fn pools(&self) -> Option<&Pools> {
+        match &self.storage {
+            Storage::Resident(tree) if self.accuracy() != Accuracy::Fast => tree.pools(),
+            _ => None,
+        }
+    }
+
+    /// The closest hit of each ray, traced with many in flight: through pools if they have been made.
+    pub(in crate::traverse) fn intersect_streaming(&self, rays: &[Ray], hits: &mut [Hit]) {
+        match self.pools() {
+            Some(pools) => self.ask_closed(InPools { pools, rays, answers: Closest(hits) }),
+            None => self.intersect_stream(rays, hits),
+        }
+    }
+
+    /// Whether anything lies in each ray's interval, likewise.
+    pub(in crate::traverse) fn occluded_streaming(&self, rays: &[Ray], occluded: &mut [bool]) {
+        match self.pools() {
+            Some(pools) => self.ask_closed(InPools { pools, rays, answers: Any(occluded) }),
+            None => self.occluded_stream(rays, occluded),
+        }
+    }
+}
+
+struct InPools<'a, A> {
+    pools: &'a Pools,
+    rays: &'a [Ray],
+    answers: A,
+}
+
+impl<A: Told> ResidentQuery for InPools<'_, A> {
+    #[inline(always)]
+    fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
+        // Rays have numbers of 32 bits.
+        trace::<S, M, A>(tree, self.pools, self.rays, &mut self.answers);
+    }
+}

@@ -1,0 +1,229 @@
+//! What becomes of rays that have ended.
+//!
+//! The triangles that they may hit wait until there are sixteen and some more, so that their records are here by then. Then each lane
+//! asks the mode's test of a triangle and of the ray that may hit it, and hits are written by whole registers, where they are nearer
+//! than what the same ray had before.
+
+use super::flight::Flight;
+use crate::geometry::triangle::{self, Mode, Own, Test, Triangle};
+use crate::geometry::{Hit, Ray};
+use crate::kdtree::{MOST, Tree};
+use crate::simd::{Lanes, Simd, Sixteen, prefetch_both};
+use crate::traverse::records::Resident;
+use crate::traverse::stream::{Answers, Any, Closest};
+
+/// Triangles that wait, and the ray of each.
+pub struct Pairs {
+    rays: [u32; ROOM + 2 * MOST],
+    primitives: [i32; ROOM + 2 * MOST],
+    count: usize,
+}
+
+/// How many wait before some are answered.
+const ROOM: usize = 24;
+
+impl Pairs {
+    pub const NONE: Self = Self { rays: [0; ROOM + 2 * MOST], primitives: [0; ROOM + 2 * MOST], count: 0 };
+
+    /// Puts the triangles there that a ray may hit, and fetches the records of the first two.
+    #[inline(always)]
+    fn put<L: Sixteen>(&mut self, flight: &Flight, records: &[Triangle]) {
+        let place = self.count.min(ROOM);
+        self.rays[place..][..2 * MOST].fill(flight.ray);
+        let primitives = self.primitives[place..].first_chunk_mut().expect("room for a list");
+        self.count = place + flight.listed::<L>(primitives);
+        for primitive in &self.primitives[place..][..2] {
+            prefetch_both(records.as_ptr().wrapping_add(*primitive as usize));
+        }
+    }
+
+    /// Takes out the first sixteen.
+    #[inline(always)]
+    fn shift(&mut self) {
+        self.rays.copy_within(16.., 0);
+        self.primitives.copy_within(16.., 0);
+        self.count = self.count.saturating_sub(16);
+    }
+}
+
+/// What sixteen rays find of a triangle each, and its corners.
+pub struct Met16<L: Sixteen> {
+    own: Own<16, L>,
+    corners: [[L; 3]; 3],
+}
+
+/// Where rays' answers go.
+pub trait Told: Answers {
+    /// What is known of a ray before anything is found.
+    fn misses(&mut self, ray: usize);
+
+    /// A ray hits something for certain, of any.
+    fn hits(&mut self, ray: usize);
+
+    /// Takes up what rays found of a triangle each, of the first `count` that wait.
+    fn tell<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &[Ray],
+        pairs: &Pairs,
+        count: usize,
+        found: &Met16<S::F16>,
+    );
+
+    /// A ray has ended.
+    #[inline(always)]
+    fn end<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &[Ray],
+        flight: &Flight,
+        pairs: &mut Pairs,
+    ) {
+        self.misses(flight.ray as usize);
+        pairs.put::<S::F16>(flight, tree.tree.triangles());
+        while pairs.count > ROOM {
+            self.answer::<S, M>(tree, rays, pairs);
+        }
+    }
+
+    /// Answers the first sixteen that wait.
+    #[inline(always)]
+    fn answer<S: Simd, M: Mode>(&mut self, tree: &Resident<'_, M::Record>, rays: &[Ray], pairs: &mut Pairs) {
+        let triangles = tree.tree.triangles();
+        let nowhere = &[0.0; 4];
+        let (mut starts, mut ways) = ([nowhere; 16], [nowhere; 16]);
+        let mut fours = [[nowhere; 16]; 3];
+        for lane in 0..16 {
+            let [start, way]: &[[f32; 4]; 2] = bytemuck::cast_ref(&rays[pairs.rays[lane] as usize]);
+            (starts[lane], ways[lane]) = (start, way);
+            let [a, b, c] = triangles[pairs.primitives[lane] as usize].fours();
+            (fours[0][lane], fours[1][lane], fours[2][lane]) = (a, b, c);
+        }
+        let [ox, oy, oz, tnear] = S::F16::of_fours(&starts);
+        let [dx, dy, dz, tfar] = S::F16::of_fours(&ways);
+        let [ax, ay, az, bx] = S::F16::of_fours(&fours[0]);
+        let [by, bz, cx, cy] = S::F16::of_fours(&fours[1]);
+        let [cz, nx, ny, nz] = S::F16::of_fours(&fours[2]);
+        let [a, b, c] = [[ax, ay, az], [bx, by, bz], [cx, cy, cz]];
+        let test = M::Test::<16, S::F16>::new(&[ox, oy, oz], &[dx, dy, dz], 0xffff);
+        let tfar = S::F16::splat(f32::MAX).min(tfar);
+        let own = M::meet_own::<16, S::F16>(&test, &[a, b, c, [nx, ny, nz]], tnear, tfar);
+        let found = Met16 { own, corners: [a, b, c] };
+        self.tell::<S, M>(tree, rays, pairs, pairs.count.min(16), &found);
+        pairs.shift();
+    }
+
+    /// Answers all that wait.
+    #[inline(always)]
+    fn finish<S: Simd, M: Mode>(&mut self, tree: &Resident<'_, M::Record>, rays: &[Ray], pairs: &mut Pairs) {
+        while pairs.count > 0 {
+            for place in pairs.count..16 {
+                (pairs.rays[place], pairs.primitives[place]) = (pairs.rays[0], pairs.primitives[0]);
+            }
+            self.answer::<S, M>(tree, rays, pairs);
+        }
+    }
+}
+
+impl Told for Closest<'_> {
+    #[inline(always)]
+    fn misses(&mut self, ray: usize) {
+        self.0[ray] = Hit::MISS;
+    }
+
+    #[inline(always)]
+    fn hits(&mut self, _ray: usize) {}
+
+    #[inline(always)]
+    fn tell<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &[Ray],
+        pairs: &Pairs,
+        count: usize,
+        Met16 { own, corners: [a, b, c] }: &Met16<S::F16>,
+    ) {
+        let corners = [
+            [a[0].store(), a[1].store(), a[2].store()],
+            [b[0].store(), b[1].store(), b[2].store()],
+            [c[0].store(), c[1].store(), c[2].store()],
+        ];
+        let [x, y, z] = triangle::normals(&corners);
+        let zero = S::F16::splat(0.0);
+        // A zero is given out without a sign.
+        let numbers = S::F16::fours(&[own.t + zero, own.u + zero, own.v + zero, zero]);
+        let present = (1 << count) - 1;
+        let mut hits = own.hits & present;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize % 16;
+            hits &= hits - 1;
+            let [t, u, v, _] = numbers[lane];
+            let (primitive, normal) = (pairs.primitives[lane] as u32, [x[lane], y[lane], z[lane]].into());
+            take_nearer(&mut self.0[pairs.rays[lane] as usize], Hit { t, u, v, primitive, normal });
+        }
+        let mut open = own.open & present;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % 16;
+            open &= open - 1;
+            let ray = pairs.rays[lane] as usize;
+            take_nearer(&mut self.0[ray], hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32));
+        }
+    }
+}
+
+/// Takes a hit if it is nearer than what was had, or as near and of a lower id.
+#[inline(always)]
+fn take_nearer(had: &mut Hit, hit: Hit) {
+    if hit.t < had.t || hit.t == had.t && hit.primitive < had.primitive {
+        *had = hit;
+    }
+}
+
+/// The hit of a ray that may hit one triangle.
+#[inline(never)]
+fn hit_of_one<M: Mode>(tree: &Resident<'_, M::Record>, ray: &Ray, primitive: u32) -> Hit {
+    let record = &tree.records[primitive as usize];
+    let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+    let candidate = test.test(record, true);
+    if !(candidate.inside && ray.tnear <= candidate.t && candidate.t <= f32::MAX.min(ray.tfar)) {
+        return Hit::MISS;
+    }
+    let [u, v] = M::Alone::weights(record, candidate.u, candidate.v);
+    // A zero is given out without a sign.
+    Hit {
+        t: candidate.t + 0.0,
+        u: u + 0.0,
+        v: v + 0.0,
+        primitive,
+        normal: triangle::normal(tree.corners(primitive)),
+    }
+}
+
+impl Told for Any<'_> {
+    #[inline(always)]
+    fn misses(&mut self, ray: usize) {
+        self.0[ray] = false;
+    }
+
+    #[inline(always)]
+    fn hits(&mut self, ray: usize) {
+        self.0[ray] = true;
+    }
+
+    #[inline(always)]
+    fn tell<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: &[Ray],
+        pairs: &Pairs,
+        count: usize,
+        found: &Met16<S::F16>,
+    ) {
+        for lane in 0..count {
+            let ray = pairs.rays[lane] as usize;
+            let is_open = found.own.open >> lane & 1 == 1;
+            self.0[ray] |= found.own.hits >> lane & 1 == 1
+                || is_open && hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32).is_hit();
+        }
+    }
+}

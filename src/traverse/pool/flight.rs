@@ -1,0 +1,164 @@
+//! Rays in flight, and the triangles that each may hit.
+//!
+//! Which triangles a ray hits, and where to the bit, is asked of the mode's own test, which takes its time; a pool says what
+//! is possible, and within which bounds. So a ray keeps a list of triangles that it *may* hit, and goes on until all that is
+//! left of it begins behind one that it hits for certain. Then one or two of those on the list are left, and the test is
+//! asked of those ([`answers`](super::answers)).
+
+use crate::geometry::Ray;
+use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
+use crate::geometry::triangle::{Candidate, Mode, Test};
+use crate::kdtree::{Chunk, MOST};
+use crate::simd::{Mask, Sixteen};
+use crate::traverse::stream::Begun;
+use crate::traverse::stream::step::Crossing;
+
+/// The id of no triangle: greater than any, so that equal `t` lets the first hit in.
+const NONE: u32 = i32::MAX as u32;
+
+/// What is known of a ray on its way, its stack left aside.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Flight {
+    pub crossing: Crossing,
+    pooled: Pooled,
+    /// The top of its stack.
+    pub top: u32,
+    /// Which ray it is.
+    pub ray: u32,
+    tnear: f32,
+    /// What a hit must not lie beyond: where the nearest of those that are certain lies at the latest, or the ray's end.
+    pub tfar: f32,
+    /// The chunk that is looked at, and how far on the next one of its leaf is, or 0.
+    pub chunk: u32,
+    pub next: u32,
+    /// How many triangles are listed, at most [`MOST`] when a chunk is looked at.
+    count: u32,
+    /// Those triangles, and where each lies at the earliest. There is room for a chunk's behind a full list.
+    ids: [i32; 2 * MOST],
+    first: [f32; 2 * MOST],
+}
+
+/// What a ray finds in a chunk.
+pub struct Finds {
+    /// Whether it may hit anything there.
+    pub possible: bool,
+    /// Whether it does for certain.
+    pub certain: bool,
+}
+
+impl Flight {
+    /// A ray that has found nothing.
+    #[inline(always)]
+    pub fn new(begun: Begun, ray: &Ray, number: usize) -> Self {
+        let Begun { crossing, top, reach, tfar } = begun;
+        let pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), reach);
+        let (ids, first) = ([0; 2 * MOST], [0.0; 2 * MOST]);
+        Self {
+            crossing,
+            pooled,
+            top,
+            ray: number as u32,
+            tnear: ray.tnear,
+            tfar,
+            chunk: 0,
+            next: 0,
+            count: 0,
+            ids,
+            first,
+        }
+    }
+
+    /// Whether another chunk of the leaf follows.
+    #[inline(always)]
+    pub fn goes_on(&self) -> bool {
+        self.next != 0
+    }
+
+    /// Whether the list has no room for another chunk's triangles.
+    #[inline(always)]
+    pub fn is_full(&self) -> bool {
+        self.count > MOST as u32
+    }
+
+    /// Looks at the chunk, and lists what the ray may hit.
+    #[inline(always)]
+    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32]) -> Finds {
+        let chunk = Chunk::at(words, self.chunk as usize);
+        let triangles = Sixteens {
+            rows: self.pooled.renamed().map(|axis| chunk.row(axis)),
+            corners: chunk.corners(),
+            count: chunk.count(),
+        };
+        let Prospects { possible, certain, first, last } = if M::SIGNS {
+            self.pooled.prospects::<L, true>(&triangles, self.tnear, self.tfar)
+        } else {
+            self.pooled.prospects::<L, false>(&triangles, self.tnear, self.tfar)
+        };
+        self.next = chunk.next() as u32;
+        self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
+        let (possible, certain) = (possible.bits(), certain.bits());
+        let at = (self.count as usize).min(MOST);
+        first.compact(possible, self.first[at..].first_chunk_mut().expect("room for a chunk's"));
+        L::ids_compact(
+            L::ids_load(chunk.ids()),
+            possible,
+            self.ids[at..].first_chunk_mut().expect("room for a chunk's"),
+        );
+        self.count = at as u32 + possible.count_ones();
+        Finds { possible: possible != 0, certain: certain != 0 }
+    }
+
+    /// Writes the listed triangles that do not lie behind the ray's end for certain, one behind the other; how many they
+    /// are. One may be there more than once.
+    #[inline(always)]
+    pub fn listed<L: Sixteen>(&self, to: &mut [i32; 2 * MOST]) -> usize {
+        let tfar = L::splat(self.tfar);
+        let (ids, _) = self.ids.as_chunks::<MOST>();
+        let (first, _) = self.first.as_chunks::<MOST>();
+        let present = (1u32 << self.count.min(MOST as u32)) - 1;
+        let bits = L::load(&first[0]).le(tfar).bits() & present;
+        L::ids_compact(L::ids_load(&ids[0]), bits, to.first_chunk_mut().expect("twice as many"));
+        let mut written = bits.count_ones() as usize;
+        if self.is_full() {
+            let present = (1u32 << (self.count - MOST as u32).min(MOST as u32)) - 1;
+            let bits = L::load(&first[1]).le(tfar).bits() & present;
+            let behind = to[written.min(MOST)..].first_chunk_mut().expect("twice as many");
+            L::ids_compact(L::ids_load(&ids[1]), bits, behind);
+            written += bits.count_ones() as usize;
+        }
+        written
+    }
+
+    /// Asks the test of all that is listed, and leaves the nearest alone on the list.
+    #[cold]
+    #[inline(never)]
+    pub fn settle<M: Mode>(&mut self, records: &[M::Record], ray: &Ray) {
+        let nearest = self.nearest::<M>(records, ray);
+        self.count = 0;
+        if let Some((id, candidate)) = nearest {
+            (self.ids[0], self.first[0], self.count) = (id as i32, candidate.t, 1);
+            self.tfar = candidate.t.min(self.tfar);
+        }
+    }
+
+    /// The nearest of what is listed, by the mode's own test, and the lowest id of several as near.
+    pub fn nearest<M: Mode>(&self, records: &[M::Record], ray: &Ray) -> Option<(u32, Candidate<1, f32>)> {
+        let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+        let mut best: Option<(u32, Candidate<1, f32>)> = None;
+        let mut nearest = (f32::MAX.min(ray.tfar), NONE);
+        for place in 0..(self.count as usize).min(2 * MOST) {
+            let id = self.ids[place] as u32;
+            if self.first[place] > self.tfar {
+                continue;
+            }
+            let candidate = test.test(&records[id as usize], true);
+            let t = candidate.t;
+            if candidate.inside && self.tnear <= t && (t < nearest.0 || t == nearest.0 && id < nearest.1) {
+                nearest = (t, id);
+                best = Some((id, candidate));
+            }
+        }
+        best
+    }
+}
