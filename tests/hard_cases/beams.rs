@@ -260,7 +260,9 @@ fn beams_that_do_not_pay_are_given_up() {
         for packets in packets.chunks(16) {
             accel.count_tile(packets, &[0xffff; 16], false, &mut counts);
         }
-        assert!(counts.tests < 2048 * counts.beams.max(1), "{counts:?}");
+        // Patience is for 2048 tests at most, and ends between blocks: the last one's sixteen triangles may be tested against
+        // all sixteen packets still.
+        assert!(counts.tests <= (2048 + 16 * 16) * counts.beams.max(1), "seed {seed}: {counts:?}");
         if known.contains(&seed) {
             assert!(counts.beams == 4 && counts.alone >= 16 * counts.beams, "{counts:?}");
         }
