@@ -269,6 +269,25 @@ impl Clipper {
         axis: usize,
         position: f32,
     ) -> [Option<Aabb>; 2] {
+        let Some(polygon) = self.clip(corners, within) else { return [None; 2] };
+        let [below, above] = polygon.bounds_of_halves(axis, position);
+        let [half_below, half_above] = within.halves(axis, position);
+        [below.within(&half_below), above.within(&half_above)]
+    }
+
+    /// The bounds of the part of a triangle inside a box, faces included; `None` if there is none.
+    pub fn part(&mut self, corners: &Corners, within: &Aabb) -> Option<Aabb> {
+        let polygon = self.clip(corners, within)?;
+        let mut range = Range::EMPTY;
+        for vertex in polygon.vertices() {
+            range.grow(vertex);
+        }
+        range.within(within)
+    }
+
+    /// What is left of a triangle inside a box, if anything is.
+    #[inline(always)]
+    fn clip(&mut self, corners: &Corners, within: &Aabb) -> Option<&Polygon> {
         let [mut polygon, mut spare] = self.polygons.each_mut();
         polygon.start(corners);
         for axis in 0..3 {
@@ -277,14 +296,12 @@ impl Clipper {
                     polygon.cut(axis, face, below, spare);
                     std::mem::swap(&mut polygon, &mut spare);
                     if polygon.is_empty() {
-                        return [None; 2];
+                        return None;
                     }
                 }
             }
         }
-        let [below, above] = polygon.bounds_of_halves(axis, position);
-        let [half_below, half_above] = within.halves(axis, position);
-        [below.within(&half_below), above.within(&half_above)]
+        Some(polygon)
     }
 }
 

@@ -25,7 +25,7 @@ pub use node::Node;
 pub use params::{BuildParams, MAX_DEPTH};
 pub(crate) use parts::Walked;
 pub use parts::{Arrays, Parts};
-pub use pools::{Chunk, MOST, Pools};
+pub use pools::{Boxes, Chunk, MOST, Pools, Way};
 pub use preset::Preset;
 pub use scale::{Scale, exponent};
 pub use spread::SPREAD_BLOCKS;

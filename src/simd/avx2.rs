@@ -257,6 +257,13 @@ impl Eight for F32x8 {
         avx!(_mm256_permutevar8x32_epi32(ids, places))
     }
     #[inline(always)]
+    fn ids_nibbles(nibbles: u32) -> __m256i {
+        avx!(_mm256_srlv_epi32(
+            _mm256_set1_epi32(nibbles as i32),
+            _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28)
+        ))
+    }
+    #[inline(always)]
     fn ids_compact(ids: __m256i, bits: u32, to: &mut [i32; 8]) {
         avx!(_mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(ids, lanes_of(bits))));
     }

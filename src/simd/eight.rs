@@ -92,6 +92,16 @@ pub trait Eight: Lanes<8> {
         Self::ids_load(&wide)
     }
 
+    /// Lane `i` is `nibbles >> 4 i`.
+    #[inline(always)]
+    fn ids_nibbles(nibbles: u32) -> Self::Ids {
+        let mut ids = [0; 8];
+        for (lane, id) in ids.iter_mut().enumerate() {
+            *id = (nibbles >> (4 * lane)) as i32;
+        }
+        Self::ids_load(&ids)
+    }
+
     /// Every lane shifted right by `BITS`; zeros come in.
     #[inline(always)]
     fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids {

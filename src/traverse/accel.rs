@@ -187,17 +187,11 @@ impl Accel {
 
     /// Has a kernel called that knows no other scene than one that is all in memory. Panics if it is not.
     pub(super) fn ask_all_in_memory<Q: ResidentQuery>(&self, query: Q) {
-        let tree = self.tree();
-        let triangles = Resident { tree, records: tree.triangles() };
-        match self.accuracy {
-            Accuracy::Fast => {
-                let tree = Resident { tree, records: &self.projected };
-                self.chosen.run(ResidentInMode::<Q, Fast> { query, tree });
-            }
-            Accuracy::Watertight => {
-                self.chosen.run(ResidentInMode::<Q, Watertight> { query, tree: triangles });
-            }
-            Accuracy::Exact => self.chosen.run(ResidentInMode::<Q, Exact> { query, tree: triangles }),
+        if self.accuracy == Accuracy::Fast {
+            let tree = Resident { tree: self.tree(), records: &self.projected };
+            self.chosen.run(ResidentInMode::<Q, Fast> { query, tree });
+        } else {
+            self.ask_closed(query);
         }
     }
 
@@ -242,12 +236,18 @@ impl Accel {
 
     /// The closest hit of one ray.
     pub fn intersect(&self, ray: &Ray) -> Hit {
-        self.intersect_packet(&RayPacket::<1>::of_slice(&[*ray]), 1).get(0)
+        match self.pools() {
+            Some(pools) => self.intersect_alone(pools, ray),
+            None => self.intersect_packet(&RayPacket::<1>::of_slice(&[*ray]), 1).get(0),
+        }
     }
 
     /// Whether anything lies in one ray's interval.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_packet(&RayPacket::<1>::of_slice(&[*ray]), 1) == 1
+        match self.pools() {
+            Some(pools) => self.occluded_alone(pools, ray),
+            None => self.occluded_packet(&RayPacket::<1>::of_slice(&[*ray]), 1) == 1,
+        }
     }
 
     /// The closest hits of the lanes whose bit is set in `active`; the others come out as misses.

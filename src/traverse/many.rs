@@ -13,7 +13,11 @@ impl Accel {
     pub fn intersect_many(&self, kernel: Kernel, rays: &[Ray], hits: &mut [Hit]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
         match kernel {
-            Kernel::Single => self.intersect_slices::<1>(rays, hits),
+            Kernel::Single => {
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = self.intersect(ray);
+                }
+            }
             Kernel::Packet4 => self.intersect_slices::<4>(rays, hits),
             Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
@@ -31,7 +35,11 @@ impl Accel {
     pub fn occluded_many(&self, kernel: Kernel, rays: &[Ray], occluded: &mut [bool]) {
         assert_eq!(rays.len(), occluded.len(), "as many answers as rays");
         match kernel {
-            Kernel::Single => self.occluded_slices::<1>(rays, occluded),
+            Kernel::Single => {
+                for (ray, occluded) in rays.iter().zip(occluded) {
+                    *occluded = self.occluded(ray);
+                }
+            }
             Kernel::Packet4 => self.occluded_slices::<4>(rays, occluded),
             Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),

@@ -112,17 +112,30 @@ impl Vertices {
     }
 }
 
-/// How many chunks some triangles take.
-pub fn count(ids: &[u32], triangles: &[Triangle], vertices: &mut Vertices) -> usize {
-    let (mut chunks, mut taken) = (0, MOST);
-    for &id in ids {
-        let corners = &triangles[id as usize].corners;
-        if taken == MOST || vertices.take(corners).is_none() {
-            vertices.clear();
-            vertices.take(corners);
-            (chunks, taken) = (chunks + 1, 0);
-        }
+/// Takes in as many of a leaf's triangles as a chunk has room for, the first ones first; each one's numbers of its corners.
+fn fill(
+    ids: &[u32],
+    triangles: &[Triangle],
+    vertices: &mut Vertices,
+    mut corners: impl FnMut([usize; 3]),
+) -> usize {
+    vertices.clear();
+    let mut taken = 0;
+    for &id in ids.iter().take(MOST) {
+        let Some(numbers) = vertices.take(&triangles[id as usize].corners) else { break };
+        corners(numbers);
         taken += 1;
+    }
+    taken
+}
+
+/// How many chunks some triangles take.
+pub fn count(mut ids: &[u32], triangles: &[Triangle]) -> usize {
+    let mut vertices = Vertices::default();
+    let mut chunks = 0;
+    while !ids.is_empty() {
+        ids = &ids[fill(ids, triangles, &mut vertices, |_| ())..];
+        chunks += 1;
     }
     chunks
 }
@@ -131,15 +144,13 @@ pub fn count(ids: &[u32], triangles: &[Triangle], vertices: &mut Vertices) -> us
 pub fn write(ids: &[u32], triangles: &[Triangle], words: &mut Vec<u32>) {
     let mut left = ids;
     let mut vertices = Vertices::default();
+    let mut corners = Vec::with_capacity(MOST);
     while !left.is_empty() {
-        vertices.clear();
-        let mut corners = Vec::with_capacity(MOST);
-        for &id in left.iter().take(MOST) {
-            let Some([a, b, c]) = vertices.take(&triangles[id as usize].corners) else { break };
-            corners.push((a | b << 4 | c << 8) as u32);
-        }
-        let (these, others) = left.split_at(corners.len());
-        let (count, vertex_count) = (these.len(), vertices.0.len());
+        corners.clear();
+        let count =
+            fill(left, triangles, &mut vertices, |[a, b, c]| corners.push((a | b << 4 | c << 8) as u32));
+        let (these, others) = left.split_at(count);
+        let vertex_count = vertices.0.len();
         let x = 1 + count.div_ceil(2);
         let ids = x + 3 * vertex_count;
         let next = if others.is_empty() { 0 } else { ids + count };

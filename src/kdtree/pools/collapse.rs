@@ -4,10 +4,11 @@
 //! cost less than its planes and what lies between them (the surface-area heuristic). Triangles that several of its leaves
 //! named are named once then, so that there is less to keep, too.
 
-use super::chunk::{self, MOST, Vertices};
+use super::chunk::{self, MOST};
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
 use crate::kdtree::Node;
+use crate::kdtree::pages::sort_and_dedup;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// What a plane costs a ray, where a chunk costs 1.
@@ -98,7 +99,7 @@ impl Source<'_> {
     }
 
     fn cost_of_leaf(&self, ids: &[u32], cell: &Aabb) -> f64 {
-        chunk::count(ids, self.triangles, &mut Vertices::default()) as f64 * cell.area()
+        chunk::count(ids, self.triangles) as f64 * cell.area()
     }
 
     /// The tree cut off at what was marked, siblings side by side.
@@ -111,16 +112,8 @@ impl Source<'_> {
             if leaves[index].load(Relaxed) {
                 let first = cut.ids.len();
                 self.gather(index, &mut cut.ids);
-                cut.ids[first..].sort_unstable();
-                let mut kept = first;
-                for next in first..cut.ids.len() {
-                    if kept == first || cut.ids[kept - 1] != cut.ids[next] {
-                        cut.ids[kept] = cut.ids[next];
-                        kept += 1;
-                    }
-                }
-                cut.ids.truncate(kept);
-                cut.nodes[place] = Node::leaf(first, kept - first);
+                sort_and_dedup(&mut cut.ids, first);
+                cut.nodes[place] = Node::leaf(first, cut.ids.len() - first);
             } else {
                 let below = cut.nodes.len();
                 cut.nodes.extend([nothing; 2]);

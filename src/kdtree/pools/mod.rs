@@ -6,50 +6,53 @@
 //! sixteen triangles at once, out of three or four lines of the cache that lie in a row.
 //!
 //! What sixteen cost no more than one of changes what a good leaf is, too: subtrees that hold up to sixteen triangles are
-//! leaves here wherever that is cheaper by the surface-area heuristic. So pools have [lines](super::lines) of their
-//! own, and fewer of them ([`collapse`]).
+//! leaves here wherever that is cheaper by the surface-area heuristic ([`collapse`]). The way to them leads through [`Boxes`].
 //!
 //! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)), and take nearly as much
 //! as the tree again. One ray against as many triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets",
 //! 2008.
 
+mod boxes;
 mod chunk;
 mod collapse;
 
+pub use boxes::{Boxes, Way};
 pub use chunk::{Chunk, MOST};
 
-use super::lines::{Line, Lines, MAX_LINE, MAX_RECORD};
 use super::{KdTree, Node};
 use crate::geometry::triangle::Triangle;
 use crate::huge;
 use collapse::{Collapsed, Source};
 use rayon::prelude::*;
 
-/// Leaves that hold their corners, and the lines that lead to them.
+/// The greatest word at which a pool may begin: what a leaf of the tree can name.
+const MAX_WORD: usize = (1 << 29) - 2;
+
+/// Leaves that hold their corners, and the nodes that lead to them.
 #[derive(Debug)]
 pub struct Pools {
-    lines: Lines,
+    nodes: Vec<Boxes>,
     /// Chunks, one behind the other; a leaf's in a row.
     words: Vec<u32>,
 }
 
 impl Pools {
-    /// Makes a tree's; `None` if there are more of them than lines can number.
+    /// Makes a tree's; `None` if there are more of them than ways can lead to.
     pub(super) fn of_tree(tree: &KdTree) -> Option<Self> {
         let KdTree { nodes, references, triangles, bounds, .. } = tree;
         let Collapsed { mut nodes, ids } = Source { nodes, references, triangles }.collapse(bounds);
+        let around = boxes::around(&nodes, &ids, triangles, bounds);
         let words = fill(&mut nodes, &ids, triangles);
-        if words.len() > MAX_RECORD {
+        if words.len() > MAX_WORD {
             return None;
         }
-        let lines = Lines::pack(&nodes, &tree.bounds);
-        (lines.all().len() <= MAX_LINE).then_some(Self { lines, words })
+        Some(Self { nodes: boxes::pack(&nodes, &around), words })
     }
 
-    /// The tree in cache lines; the root is the first. A leaf's record is the place of its first chunk.
+    /// Nodes of boxes; the root is the first.
     #[inline(always)]
-    pub fn lines(&self) -> &[Line] {
-        self.lines.all()
+    pub fn nodes(&self) -> &[Boxes] {
+        &self.nodes
     }
 
     /// The words of all chunks, with room behind them for as many as a chunk may span.
@@ -60,14 +63,15 @@ impl Pools {
 
     /// Memory.
     pub fn bytes(&self) -> usize {
-        self.lines.bytes() + size_of_val(&self.words[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.words[..])
     }
 }
 
 /// Leaves whose chunks are written at once.
 const LEAVES: usize = 1024;
 
-/// Writes all leaves' chunks and has the leaves name theirs, in the order of a depth-first walk.
+/// Writes all leaves' chunks and has the leaves name theirs, in the order of a depth-first walk. No chunk begins at word
+/// 0; the first one has no triangles.
 fn fill(nodes: &mut [Node], ids: &[u32], triangles: &[Triangle]) -> Vec<u32> {
     let mut leaves = Vec::new();
     let mut stack = vec![0];
@@ -91,18 +95,18 @@ fn fill(nodes: &mut [Node], ids: &[u32], triangles: &[Triangle]) -> Vec<u32> {
         })
         .collect();
     let total: usize = blocks.iter().map(|(words, _)| words.len()).sum();
-    let mut all = huge::room_for(total + chunk::SPAN);
+    let mut all = huge::room_for(2 + total + chunk::SPAN);
+    all.extend([0; 2]);
     for ((words, starts), leaves) in blocks.iter().zip(leaves.chunks(LEAVES)) {
         for (&leaf, start) in leaves.iter().zip(starts) {
-            // A leaf's record is the word before its first reference.
             let count = nodes[leaf].references().len();
-            if all.len() + start < MAX_RECORD {
-                nodes[leaf] = Node::leaf(all.len() + start + 1, count);
+            if all.len() + start <= MAX_WORD {
+                nodes[leaf] = Node::leaf(all.len() + start, count);
             }
         }
         all.extend_from_slice(words);
     }
-    all.resize(total + chunk::SPAN, 0);
+    all.resize(all.len() + chunk::SPAN, 0);
     all
 }
 

@@ -1,12 +1,14 @@
 use super::*;
-use crate::geometry::Aabb;
-use crate::kdtree::{BuildParams, Exit, Tree};
+use crate::kdtree::{BuildParams, Tree};
 use crate::mesh::Mesh;
 use crate::mesh::generate::shapes;
 use glam::Vec3;
 
+/// A triangle's id, and its corners.
+type Held = (u32, [[f32; 3]; 3]);
+
 /// All chunks of a leaf: ids, and the corners that they hold.
-fn leaf(pools: &Pools, mut word: usize) -> Vec<(u32, [[f32; 3]; 3])> {
+fn leaf(pools: &Pools, mut word: usize) -> Vec<Held> {
     let mut triangles = Vec::new();
     loop {
         let chunk = Chunk::at(pools.words(), word);
@@ -26,29 +28,26 @@ fn leaf(pools: &Pools, mut word: usize) -> Vec<(u32, [[f32; 3]; 3])> {
     }
 }
 
-/// The triangles of the leaf that a point inside the bounds is in; from above if the point is in a plane.
-fn leaf_at(pools: &Pools, point: Vec3) -> Vec<(u32, [[f32; 3]; 3])> {
-    let mut line = &pools.lines()[0];
-    loop {
-        let mut exit = 0;
-        for level in 0..3 {
-            let place = match level {
-                0 => 0,
-                1 => 4 * exit + 1,
-                _ => 4 * (exit >> 1) + 2 + (exit & 1),
-            };
-            let axis = ((line.exits[place] & 3) as usize).min(2);
-            exit = 2 * exit + usize::from(line.planes[place] <= point[axis]);
+/// What lies in the pools of all boxes that a point lies in, or beside by `slack`; and how many boxes those are.
+fn pools_at(pools: &Pools, point: Vec3, slack: f32) -> (Vec<Held>, usize) {
+    let (mut found, mut count) = (Vec::new(), 0);
+    let mut stack = vec![Way::ROOT];
+    while let Some(way) = stack.pop() {
+        if way.is_pool() {
+            found.extend(leaf(pools, way.word()));
+            count += 1;
+            continue;
         }
-        let to = Exit(line.exits[exit]);
-        if to.is_leaf() {
-            return leaf(pools, to.record());
-        }
-        if to.line() == 0 {
-            return Vec::new();
-        }
-        line = &pools.lines()[to.line()];
+        let Boxes { faces, ways, .. } = &pools.nodes()[way.node()];
+        let holds = |lane: &usize| {
+            (0..3).all(|axis| {
+                let [least, greatest] = faces[axis].map(|row| row[*lane]);
+                least - slack <= point[axis] && point[axis] <= greatest + slack
+            })
+        };
+        stack.extend((0..8).filter(holds).map(|lane| Way(ways[lane])));
     }
+    (found, count)
 }
 
 fn tree_of(mesh: &Mesh) -> KdTree {
@@ -58,32 +57,76 @@ fn tree_of(mesh: &Mesh) -> KdTree {
     tree
 }
 
+/// Numbers between 0 and 1.
+fn numbers() -> impl FnMut() -> f32 {
+    let mut part = 0.0f64;
+    move || {
+        part = (part + 0.618_033_988_749_895).fract();
+        part as f32
+    }
+}
+
 #[test]
-fn a_pool_holds_what_the_trees_leaf_names_and_its_corners() {
+fn every_point_of_a_triangle_lies_in_a_box_around_a_pool_that_holds_it() {
     for mesh in [shapes::soup(3000, 1), shapes::soup(20, 2), shapes::soup(1, 3)] {
         let tree = tree_of(&mesh);
         let pools = tree.pools().expect("they are made");
-        let bounds: &Aabb = tree.bounds();
-        let mut part = 0.0f64;
-        for _ in 0..2000 {
-            let mut next = || {
-                part = (part + 0.618_033_988_749_895).fract();
-                part as f32
-            };
-            let point = bounds.min + (bounds.max - bounds.min) * Vec3::new(next(), next(), next());
-            let mut node = tree.root();
-            while !node.is_leaf() {
-                node = tree.children(node)[usize::from(node.split() <= point[node.axis()])];
+        let slack = tree.bounds().extent().max_element() / (1 << 22) as f32;
+        let mut number = numbers();
+        for (id, triangle) in tree.triangles().iter().enumerate() {
+            let [a, b, c] = triangle.corners.map(Vec3::from_array);
+            for _ in 0..8 {
+                let (u, v) = (number(), number());
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let point = a + (b - a) * u + (c - a) * v;
+                let (found, _) = pools_at(pools, point, slack);
+                assert!(found.contains(&(id as u32, triangle.corners)), "{id} is not found in {point}");
             }
-            let found = leaf_at(pools, point);
-            for (id, corners) in &found {
-                assert_eq!(tree.triangles()[*id as usize].corners, *corners);
-            }
-            let ids: Vec<u32> = found.iter().map(|(id, _)| *id).collect();
-            assert!(ids.is_sorted_by(|a, b| a < b), "each once: {ids:?}");
-            assert!(tree.primitives(node).iter().all(|id| ids.contains(id)), "{point}");
         }
     }
+}
+
+#[test]
+fn boxes_do_not_overlap_and_pools_name_a_triangle_once() {
+    let tree = tree_of(&shapes::soup(3000, 1));
+    let (pools, bounds) = (tree.pools().expect("they are made"), tree.bounds());
+    let mut number = numbers();
+    let mut met = 0;
+    for _ in 0..5000 {
+        let part = Vec3::new(number(), number(), number());
+        let (found, boxes) = pools_at(pools, bounds.min + bounds.extent() * part, 0.0);
+        assert!(boxes <= 1);
+        met += boxes;
+        let ids: Vec<u32> = found.iter().map(|(id, _)| *id).collect();
+        assert!(ids.is_sorted_by(|a, b| a < b), "each once: {ids:?}");
+    }
+    assert!(met > 500, "{met} of 5000 points lie in boxes");
+}
+
+#[test]
+fn orders_are_those_in_which_rays_come_to_boxes() {
+    let tree = tree_of(&shapes::soup(3000, 1));
+    let pools = tree.pools().expect("they are made");
+    let mut full = 0;
+    for Boxes { faces, ways, orders } in pools.nodes() {
+        let boxes = ways.iter().filter(|&&way| way != Way::NOTHING.0).count();
+        full += usize::from(boxes == 8);
+        for (octant, order) in orders.iter().enumerate() {
+            let order: Vec<usize> = (0..8).map(|place| (order >> (4 * place) & 15) as usize).collect();
+            assert_eq!((0..8).filter(|lane| order.contains(lane)).count(), 8, "each has one place");
+            assert!(order[boxes..].iter().all(|&lane| ways[lane] == Way::NOTHING.0), "there are {boxes}");
+            for (place, &later) in order[..boxes].iter().enumerate() {
+                for &earlier in &order[place + 1..boxes] {
+                    let apart = |axis: usize| match octant >> axis & 1 {
+                        0 => faces[axis][1][earlier] <= faces[axis][0][later],
+                        _ => faces[axis][1][later] <= faces[axis][0][earlier],
+                    };
+                    assert!((0..3).any(apart), "{later} lies behind {earlier} for octant {octant}");
+                }
+            }
+        }
+    }
+    assert!(4 * full > pools.nodes().len(), "{full} of {} nodes have eight boxes", pools.nodes().len());
 }
 
 #[test]
@@ -103,10 +146,10 @@ fn a_leaf_of_many_triangles_is_a_row_of_chunks() {
         let ids: Vec<u32> = (0..40).rev().collect();
         let mut words = vec![7; 3];
         chunk::write(&ids, &triangles, &mut words);
-        let chunks = chunk::count(&ids, &triangles, &mut chunk::Vertices::default());
+        let chunks = chunk::count(&ids, &triangles);
         assert_eq!(chunks, ids.len().div_ceil(most));
         words.resize(words.len() + chunk::SPAN, 0);
-        let pools = Pools { lines: Lines::pack(&[Node::leaf(0, 0)], &Aabb::EMPTY), words };
+        let pools = Pools { nodes: Vec::new(), words };
         let found = leaf(&pools, 3);
         assert_eq!(found.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids);
         for (id, corners) in found {

@@ -1,6 +1,6 @@
 //! Rays through the pools of an [`Accel`].
 
-use super::{Told, trace};
+use super::{Told, alone, trace};
 use crate::error::{Error, Result};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Accuracy, Hit, Ray};
@@ -55,6 +55,22 @@ impl Accel {
             None => self.occluded_stream(rays, occluded),
         }
     }
+
+    /// The closest hit of one ray by itself, through pools.
+    #[inline(never)]
+    pub(in crate::traverse) fn intersect_alone(&self, pools: &Pools, ray: &Ray) -> Hit {
+        let mut hit = [Hit::MISS];
+        self.ask_closed(Alone { pools, ray, answers: Closest(&mut hit) });
+        hit[0]
+    }
+
+    /// Whether anything lies in one ray's interval, likewise.
+    #[inline(never)]
+    pub(in crate::traverse) fn occluded_alone(&self, pools: &Pools, ray: &Ray) -> bool {
+        let mut occluded = [false];
+        self.ask_closed(Alone { pools, ray, answers: Any(&mut occluded) });
+        occluded[0]
+    }
 }
 
 struct InPools<'a, A> {
@@ -68,5 +84,18 @@ impl<A: Told> ResidentQuery for InPools<'_, A> {
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         // Rays have numbers of 32 bits.
         trace::<S, M, A>(tree, self.pools, self.rays, &mut self.answers);
+    }
+}
+
+struct Alone<'a, A> {
+    pools: &'a Pools,
+    ray: &'a Ray,
+    answers: A,
+}
+
+impl<A: Told> ResidentQuery for Alone<'_, A> {
+    #[inline(always)]
+    fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
+        alone::trace::<S, M, A>(tree, self.pools, self.ray, &mut self.answers);
     }
 }

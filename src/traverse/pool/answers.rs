@@ -5,12 +5,12 @@
 //! than what the same ray had before.
 
 use super::flight::Flight;
-use crate::geometry::triangle::{self, Mode, Own, Test, Triangle};
+use crate::geometry::triangle::{self, Candidate, Mode, Own, Test, Triangle};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{MOST, Tree};
 use crate::simd::{Lanes, Simd, Sixteen, prefetch_both};
 use crate::traverse::records::Resident;
-use crate::traverse::stream::{Answers, Any, Closest};
+use crate::traverse::stream::{Any, Closest, OneByOne};
 
 /// Triangles that wait, and the ray of each.
 pub struct Pairs {
@@ -53,10 +53,7 @@ pub struct Met16<L: Sixteen> {
 }
 
 /// Where rays' answers go.
-pub trait Told: Answers {
-    /// What is known of a ray before anything is found.
-    fn misses(&mut self, ray: usize);
-
+pub trait Told: OneByOne {
     /// A ray hits something for certain, of any.
     fn hits(&mut self, ray: usize);
 
@@ -79,12 +76,15 @@ pub trait Told: Answers {
         flight: &Flight,
         pairs: &mut Pairs,
     ) {
-        self.misses(flight.ray as usize);
+        self.missed(flight.ray as usize);
         pairs.put::<S::F16>(flight, tree.tree.triangles());
         while pairs.count > ROOM {
             self.answer::<S, M>(tree, rays, pairs);
         }
     }
+
+    /// Answers a ray that has ended and is alone.
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight);
 
     /// Answers the first sixteen that wait.
     #[inline(always)]
@@ -127,11 +127,6 @@ pub trait Told: Answers {
 
 impl Told for Closest<'_> {
     #[inline(always)]
-    fn misses(&mut self, ray: usize) {
-        self.0[ray] = Hit::MISS;
-    }
-
-    #[inline(always)]
     fn hits(&mut self, _ray: usize) {}
 
     #[inline(always)]
@@ -169,6 +164,13 @@ impl Told for Closest<'_> {
             take_nearer(&mut self.0[ray], hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32));
         }
     }
+
+    #[inline(always)]
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
+        let nearest = flight.nearest::<M>(tree.records, ray);
+        self.0[flight.ray as usize] =
+            nearest.map_or(Hit::MISS, |(id, candidate)| hit_of::<M>(tree, id, &candidate));
+    }
 }
 
 /// Takes a hit if it is nearer than what was had, or as near and of a lower id.
@@ -188,7 +190,13 @@ fn hit_of_one<M: Mode>(tree: &Resident<'_, M::Record>, ray: &Ray, primitive: u32
     if !(candidate.inside && ray.tnear <= candidate.t && candidate.t <= f32::MAX.min(ray.tfar)) {
         return Hit::MISS;
     }
-    let [u, v] = M::Alone::weights(record, candidate.u, candidate.v);
+    hit_of::<M>(tree, primitive, &candidate)
+}
+
+/// The record of a hit that was found.
+#[inline(always)]
+fn hit_of<M: Mode>(tree: &Resident<'_, M::Record>, primitive: u32, candidate: &Candidate<1, f32>) -> Hit {
+    let [u, v] = M::Alone::weights(&tree.records[primitive as usize], candidate.u, candidate.v);
     // A zero is given out without a sign.
     Hit {
         t: candidate.t + 0.0,
@@ -200,11 +208,6 @@ fn hit_of_one<M: Mode>(tree: &Resident<'_, M::Record>, ray: &Ray, primitive: u32
 }
 
 impl Told for Any<'_> {
-    #[inline(always)]
-    fn misses(&mut self, ray: usize) {
-        self.0[ray] = false;
-    }
-
     #[inline(always)]
     fn hits(&mut self, ray: usize) {
         self.0[ray] = true;
@@ -225,5 +228,10 @@ impl Told for Any<'_> {
             self.0[ray] |= found.own.hits >> lane & 1 == 1
                 || is_open && hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32).is_hit();
         }
+    }
+
+    #[inline(always)]
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
+        self.0[flight.ray as usize] = flight.nearest::<M>(tree.records, ray).is_some();
     }
 }

@@ -5,33 +5,26 @@
 //! left of it begins behind one that it hits for certain. Then one or two of those on the list are left, and the test is
 //! asked of those ([`answers`](super::answers)).
 
+use super::step::Slabs;
 use crate::geometry::Ray;
 use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
 use crate::geometry::triangle::{Candidate, Mode, Test};
 use crate::kdtree::{Chunk, MOST};
 use crate::simd::{Mask, Sixteen};
-use crate::traverse::stream::Begun;
-use crate::traverse::stream::step::Crossing;
-
-/// The id of no triangle: greater than any, so that equal `t` lets the first hit in.
-const NONE: u32 = i32::MAX as u32;
 
 /// What is known of a ray on its way, its stack left aside.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Flight {
-    pub crossing: Crossing,
+    pub slabs: Slabs,
     pooled: Pooled,
     /// The top of its stack.
     pub top: u32,
     /// Which ray it is.
     pub ray: u32,
-    tnear: f32,
+    pub tnear: f32,
     /// What a hit must not lie beyond: where the nearest of those that are certain lies at the latest, or the ray's end.
     pub tfar: f32,
-    /// The chunk that is looked at, and how far on the next one of its leaf is, or 0.
-    pub chunk: u32,
-    pub next: u32,
     /// How many triangles are listed, at most [`MOST`] when a chunk is looked at.
     count: u32,
     /// Those triangles, and where each lies at the earliest. There is room for a chunk's behind a full list.
@@ -45,34 +38,17 @@ pub struct Finds {
     pub possible: bool,
     /// Whether it does for certain.
     pub certain: bool,
+    /// How many words behind the chunk's first its pool's next one begins, or 0.
+    pub next: usize,
 }
 
 impl Flight {
     /// A ray that has found nothing.
     #[inline(always)]
-    pub fn new(begun: Begun, ray: &Ray, number: usize) -> Self {
-        let Begun { crossing, top, reach, tfar } = begun;
+    pub fn new(slabs: Slabs, [reach, tfar]: [f32; 2], ray: &Ray, number: usize) -> Self {
         let pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), reach);
         let (ids, first) = ([0; 2 * MOST], [0.0; 2 * MOST]);
-        Self {
-            crossing,
-            pooled,
-            top,
-            ray: number as u32,
-            tnear: ray.tnear,
-            tfar,
-            chunk: 0,
-            next: 0,
-            count: 0,
-            ids,
-            first,
-        }
-    }
-
-    /// Whether another chunk of the leaf follows.
-    #[inline(always)]
-    pub fn goes_on(&self) -> bool {
-        self.next != 0
+        Self { slabs, pooled, top: 1, ray: number as u32, tnear: ray.tnear, tfar, count: 0, ids, first }
     }
 
     /// Whether the list has no room for another chunk's triangles.
@@ -81,10 +57,10 @@ impl Flight {
         self.count > MOST as u32
     }
 
-    /// Looks at the chunk, and lists what the ray may hit.
+    /// Looks at the chunk that begins at a word, and lists what the ray may hit.
     #[inline(always)]
-    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32]) -> Finds {
-        let chunk = Chunk::at(words, self.chunk as usize);
+    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize) -> Finds {
+        let chunk = Chunk::at(words, first);
         let triangles = Sixteens {
             rows: self.pooled.renamed().map(|axis| chunk.row(axis)),
             corners: chunk.corners(),
@@ -95,7 +71,6 @@ impl Flight {
         } else {
             self.pooled.prospects::<L, false>(&triangles, self.tnear, self.tfar)
         };
-        self.next = chunk.next() as u32;
         self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
         let (possible, certain) = (possible.bits(), certain.bits());
         let at = (self.count as usize).min(MOST);
@@ -106,7 +81,14 @@ impl Flight {
             self.ids[at..].first_chunk_mut().expect("room for a chunk's"),
         );
         self.count = at as u32 + possible.count_ones();
-        Finds { possible: possible != 0, certain: certain != 0 }
+        Finds { possible: possible != 0, certain: certain != 0, next: chunk.next() }
+    }
+
+    /// The listed triangles that do not lie behind the ray's end for certain. One may be there more than once.
+    #[inline(always)]
+    pub fn left(&self) -> impl Iterator<Item = u32> {
+        let listed = self.ids.iter().zip(&self.first).take(self.count as usize);
+        listed.filter(|&(_, &first)| first <= self.tfar).map(|(&id, _)| id as u32)
     }
 
     /// Writes the listed triangles that do not lie behind the ray's end for certain, one behind the other; how many they
@@ -136,26 +118,24 @@ impl Flight {
     pub fn settle<M: Mode>(&mut self, records: &[M::Record], ray: &Ray) {
         let nearest = self.nearest::<M>(records, ray);
         self.count = 0;
-        if let Some((id, candidate)) = nearest {
-            (self.ids[0], self.first[0], self.count) = (id as i32, candidate.t, 1);
-            self.tfar = candidate.t.min(self.tfar);
+        if let Some((id, Candidate { t, .. })) = nearest {
+            (self.ids[0], self.first[0], self.count) = (id as i32, t, 1);
+            self.tfar = t.min(self.tfar);
         }
     }
 
     /// The nearest of what is listed, by the mode's own test, and the lowest id of several as near.
+    #[inline(always)]
     pub fn nearest<M: Mode>(&self, records: &[M::Record], ray: &Ray) -> Option<(u32, Candidate<1, f32>)> {
         let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+        let tfar = f32::MAX.min(ray.tfar);
         let mut best: Option<(u32, Candidate<1, f32>)> = None;
-        let mut nearest = (f32::MAX.min(ray.tfar), NONE);
-        for place in 0..(self.count as usize).min(2 * MOST) {
-            let id = self.ids[place] as u32;
-            if self.first[place] > self.tfar {
-                continue;
-            }
+        for id in self.left() {
             let candidate = test.test(&records[id as usize], true);
             let t = candidate.t;
-            if candidate.inside && self.tnear <= t && (t < nearest.0 || t == nearest.0 && id < nearest.1) {
-                nearest = (t, id);
+            let nearer =
+                best.as_ref().map_or(t <= tfar, |(other, best)| t < best.t || t == best.t && id < *other);
+            if candidate.inside && self.tnear <= t && nearer {
                 best = Some((id, candidate));
             }
         }

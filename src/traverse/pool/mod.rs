@@ -16,49 +16,49 @@
 //! [`Pooled`](crate::geometry::triangle::pooled::Pooled) have this kernel: watertight and exact.
 
 mod accel;
+mod alone;
 mod answers;
 mod flight;
+mod start;
+mod step;
 
 use super::records::Resident;
-use super::stream::step::{END, Waiting, step};
-use super::stream::{Group, IN_FLIGHT, Set, with_stacks};
+use super::stream::step::{END, Waiting};
+use super::stream::{IN_FLIGHT, Set, with_stacks};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
-use crate::kdtree::{Exit, Line, Pools, Tree};
+use crate::kdtree::{Boxes, Pools, Tree, Way};
 use crate::simd::{Simd, prefetch};
 use answers::{Pairs, Told};
 use flight::{Finds, Flight};
+use start::Starts;
 use std::hint::select_unpredictable;
+use step::step;
 
 /// Where rays go on.
 struct Ways<'a> {
-    lines: &'a [Line],
+    nodes: &'a [Boxes],
     words: &'a [u32],
 }
 
 impl Ways<'_> {
-    /// Fetches what a ray will need that takes an exit, and says whether that is a leaf, or the end.
+    /// Fetches what a ray will need that goes a way, or most of it, and says whether that is a pool, or the end.
     #[inline(always)]
-    fn fetch(&self, exit: i32) -> bool {
-        let exit = Exit(exit);
-        let line = self.lines.as_ptr().wrapping_add(exit.line()).cast::<u32>();
-        let chunk = self.words.as_ptr().wrapping_add(exit.record());
-        prefetch(select_unpredictable(exit.is_leaf(), chunk, line));
-        exit.is_leaf()
-    }
-
-    /// Fetches the lines that a chunk lies in, or most of them.
-    #[inline(always)]
-    fn fetch_chunk(&self, first: usize) {
-        for line in 0..CHUNK_LINES {
-            prefetch(self.words.as_ptr().wrapping_add(first + LINE * line));
+    fn fetch(&self, way: i32) -> bool {
+        let way = Way(way);
+        let node = self.nodes.as_ptr().wrapping_add(way.node()).cast::<u32>();
+        let chunk = self.words.as_ptr().wrapping_add(way.word());
+        let first = select_unpredictable(way.is_pool(), chunk, node);
+        for line in 0..FETCHED {
+            prefetch(first.wrapping_add(LINE * line));
         }
+        way.is_pool()
     }
 }
 
-/// Words in a line of the cache, and lines that most chunks lie in.
+/// Words in a line of the cache, and lines that a node has, and most chunks lie in.
 const LINE: usize = 16;
-const CHUNK_LINES: usize = 4;
+const FETCHED: usize = 4;
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
@@ -84,39 +84,35 @@ fn fly<S: Simd, M: Mode, A: Told>(
 ) {
     let Resident { tree, records } = *resident;
     if !tree.scale().is_none() {
-        for (number, ray) in rays.iter().enumerate() {
-            answers.odd::<M>(resident, number, ray);
-        }
+        answers.all_odd::<M>(resident, rays);
         return;
     }
-    let (lines, words) = (pools.lines(), pools.words());
+    let (nodes, words) = (pools.nodes(), pools.words());
     let mut flights: Vec<Flight> = Vec::with_capacity(IN_FLIGHT);
-    let ways = Ways { lines, words };
-    // Rays that wait for the same: those that are at a line; at a leaf, or their end; at a chunk; that found something;
-    // that hit something, where any hit will do.
-    let (mut at_line, mut at_leaf, mut at_chunk) = (Set::NONE, Set::NONE, Set::NONE);
+    let ways = Ways { nodes, words };
+    // Rays that wait for the same: those that are at a node; at a chunk, or their end; that found something; that hit
+    // something, where any hit will do.
+    let (mut at_node, mut at_chunk, mut more_chunks) = (Set::NONE, Set::NONE, Set::NONE);
     let (mut found, mut hit) = (Set::NONE, Set::NONE);
     let mut pairs = Pairs::NONE;
     let mut free = Set::ALL;
     let mut ahead = 0;
-    let mut group = Group::new();
     loop {
         // New rays in the place of those that have ended, eight at a time.
         while ahead < rays.len() && free.len() >= 8 {
             let eight = &rays[ahead..rays.len().min(ahead + 8)];
-            group.prepare::<S::F8>(eight, tree.bounds(), lines);
+            let starts = Starts::new::<S::F8>(eight, tree.bounds());
             for (lane, ray) in eight.iter().enumerate() {
                 let number = ahead + lane;
-                if group.odd >> lane & 1 == 1 {
+                if starts.odd >> lane & 1 == 1 {
                     answers.odd::<M>(resident, number, ray);
-                } else if group.flies >> lane & 1 == 0 {
-                    answers.misses(number);
+                } else if starts.flies >> lane & 1 == 0 {
+                    answers.missed(number);
                 } else {
                     let k = free.pop().expect("as many as rays");
-                    let flight = Flight::new(group.begin(lane, &mut stacks[k]), ray, number);
-                    let is_leaf = ways.fetch(stacks[k].exits[flight.top as usize]);
-                    at_leaf.put_if(k, is_leaf);
-                    at_line.put_if(k, !is_leaf);
+                    let flight = Flight::new(starts.slabs(lane), starts.reach_and_tfar(lane), ray, number);
+                    stacks[k].begin();
+                    at_node.put_if(k, true);
                     if flights.is_empty() {
                         // The others are written over before they are looked at.
                         flights.resize(IN_FLIGHT, flight);
@@ -132,16 +128,24 @@ fn fly<S: Simd, M: Mode, A: Told>(
             return;
         };
 
-        // Chunks. Where nothing is found, a ray goes on with the next one of its leaf, or if that was all, with what
-        // is next on its stack.
+        // Chunks, whose words are here by now, and rays that have ended. Where nothing is found, a ray goes on with the next
+        // chunk of its pool, or with what is next on its stack.
         while let Some(k) = at_chunk.pop() {
-            let (flight, waiting) = (&mut flights[k], &stacks[k]);
-            let Finds { possible, certain } = flight.look::<S::F16, M>(words);
+            let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
+            let top = flight.top as usize;
+            let way = Way(waiting.exits[top]);
+            if way.0 == END {
+                answers.end::<S, M>(resident, rays, flight, &mut pairs);
+                free.put_if(k, true);
+                continue;
+            }
+            let Finds { possible, certain, next } = flight.look::<S::F16, M>(words, way.word());
+            waiting.exits[top] = way.further(next).0;
+            flight.top -= u32::from(next == 0);
             let ends = A::ANY & certain;
-            flight.top -= u32::from(!possible & !flight.goes_on());
-            let is_leaf = ways.fetch(waiting.exits[flight.top as usize]);
-            at_leaf.put_if(k, is_leaf & !possible);
-            at_line.put_if(k, !is_leaf & !possible);
+            let is_pool = ways.fetch(waiting.exits[flight.top as usize]);
+            more_chunks.put_if(k, is_pool & !possible);
+            at_node.put_if(k, !is_pool & !possible);
             found.put_if(k, possible & !ends);
             if A::ANY {
                 hit.put_if(k, ends);
@@ -154,43 +158,26 @@ fn fly<S: Simd, M: Mode, A: Told>(
             if flight.is_full() {
                 flight.settle::<M>(records, &rays[flight.ray as usize]);
             }
-            if !flight.goes_on() {
-                flight.top = waiting.reached::<S::F8>(flight.top as usize - 1, flight.tfar) as u32;
-            }
-            let is_leaf = ways.fetch(waiting.exits[flight.top as usize]);
-            at_leaf.put_if(k, is_leaf);
-            at_line.put_if(k, !is_leaf);
+            flight.top = waiting.reached::<S::F8>(flight.top as usize, flight.tfar) as u32;
+            let is_pool = ways.fetch(waiting.exits[flight.top as usize]);
+            more_chunks.put_if(k, is_pool);
+            at_node.put_if(k, !is_pool);
         }
         while let Some(k) = hit.pop() {
             answers.hits(flights[k].ray as usize);
             free.put_if(k, true);
         }
 
-        // Leaves whose chunks are on their way, and rays that have ended.
-        while let Some(k) = at_leaf.pop() {
-            let flight = &mut flights[k];
-            let exit = stacks[k].exits[flight.top as usize];
-            if exit == END {
-                answers.end::<S, M>(resident, rays, flight, &mut pairs);
-                free.put_if(k, true);
-                continue;
-            }
-            let record = Exit(exit).record() as u32;
-            flight.chunk = select_unpredictable(flight.goes_on(), flight.chunk + flight.next, record);
-            flight.next = 0;
-            ways.fetch_chunk(flight.chunk as usize);
-            at_chunk.put_if(k, true);
-        }
-
-        // Lines. Those who go on with a line are there again in the next round.
-        let mut here = at_line;
+        // Nodes. Those who go on with a node are there again in the next round.
+        at_chunk = std::mem::replace(&mut more_chunks, Set::NONE);
+        let mut here = at_node;
         while let Some(k) = here.pop() {
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
-            let top = step::<S::F8>(lines, &flight.crossing, waiting, top, flight.tfar);
+            let top = step::<S::F8>(nodes, &flight.slabs, waiting, top, flight.tnear, flight.tfar);
             flight.top = top as u32;
-            at_leaf.put_if(k, ways.fetch(waiting.exits[top]));
+            at_chunk.put_if(k, ways.fetch(waiting.exits[top]));
         }
-        at_line = at_line.without(at_leaf);
+        at_node = at_node.without(at_chunk);
     }
 }

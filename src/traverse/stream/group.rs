@@ -42,8 +42,6 @@ pub struct Group {
     direction: [[f32; 8]; 3],
     inverse: [[f32; 8]; 3],
     margin: [[f32; 8]; 3],
-    /// How far the scene reaches from the origins.
-    reach: [f32; 8],
     tnear: [f32; 8],
     tmin: [f32; 8],
     tmax: [f32; 8],
@@ -65,17 +63,6 @@ pub struct Group {
     last: [f32; 8],
 }
 
-/// A ray at its beginning.
-pub struct Begun {
-    pub crossing: Crossing,
-    /// The top of its stack.
-    pub top: u32,
-    /// How far the scene reaches from its origin.
-    pub reach: f32,
-    /// What a hit must not lie beyond.
-    pub tfar: f32,
-}
-
 impl Group {
     /// A group that nothing is known of.
     pub const fn new() -> Self {
@@ -85,7 +72,6 @@ impl Group {
             direction: [ROW; 3],
             inverse: [ROW; 3],
             margin: [ROW; 3],
-            reach: ROW,
             tnear: ROW,
             tmin: ROW,
             tmax: ROW,
@@ -116,7 +102,7 @@ impl Group {
         let present = (1u32 << rays.len().min(8)) - 1;
         let (origin, direction) = (load3::<8, L>(&self.origin), load3::<8, L>(&self.direction));
         let (tnear, tfar) = (L::load(&self.tnear), L::load(&self.closest));
-        let Ready { inverse, reach, thickness, margin, tmin, tmax, closest, ordinary, flies } =
+        let Ready { inverse, thickness, margin, tmin, tmax, closest, ordinary, flies, .. } =
             Ready::new(&origin, &direction, tnear, tfar, bounds);
         self.odd = !ordinary & present;
         self.flies = flies & present;
@@ -124,7 +110,6 @@ impl Group {
             self.inverse[axis] = inverse[axis].store();
             self.margin[axis] = margin[axis].store();
         }
-        self.reach = reach.store();
         (self.tmin, self.tmax, self.closest) = (tmin.store(), tmax.store(), closest.store());
         self.primitive = [NONE as i32; 8];
         (self.len, self.exit) = (0, 0);
@@ -214,9 +199,15 @@ impl Group {
         self.exit = NOWHERE;
     }
 
-    /// Begins the ray in a lane: fills its stack. It may be at its end at once.
+    /// Starts the ray in a lane: fills its stack. It may be at its end at once.
     #[inline(always)]
-    pub fn begin(&self, lane: usize, waiting: &mut Waiting) -> Begun {
+    pub fn start<A: Test<1, f32>>(
+        &self,
+        lane: usize,
+        ray: &Ray,
+        number: usize,
+        waiting: &mut Waiting,
+    ) -> Flight<A> {
         let four = |rows: &[[f32; 8]; 3]| [rows[0][lane], rows[1][lane], rows[2][lane], 0.0];
         let tfar = self.closest[lane];
         (waiting.exits[0], waiting.tmin[0], waiting.tmax[0]) = (END, f32::NEG_INFINITY, f32::NEG_INFINITY);
@@ -229,24 +220,13 @@ impl Group {
         let (enters, leaves) = (self.tmin[lane], self.last[lane]);
         (waiting.exits[top], waiting.tmin[top], waiting.tmax[top]) = (self.exit, enters, leaves);
         top -= usize::from(self.exit == NOWHERE || enters > leaves);
-        let crossing =
-            Crossing { origin: four(&self.origin), inverse: four(&self.inverse), margin: four(&self.margin) };
-        Begun { crossing, top: top as u32, reach: self.reach[lane], tfar }
-    }
-
-    /// Starts the ray in a lane.
-    #[inline(always)]
-    pub fn start<A: Test<1, f32>>(
-        &self,
-        lane: usize,
-        ray: &Ray,
-        number: usize,
-        waiting: &mut Waiting,
-    ) -> Flight<A> {
-        let Begun { crossing, top, tfar, .. } = self.begin(lane, waiting);
         Flight {
-            crossing,
-            top,
+            crossing: Crossing {
+                origin: four(&self.origin),
+                inverse: four(&self.inverse),
+                margin: four(&self.margin),
+            },
+            top: top as u32,
             ray: number as u32,
             tnear: ray.tnear,
             tfar,

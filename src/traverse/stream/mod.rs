@@ -37,7 +37,7 @@ use crate::geometry::{Hit, Ray};
 use crate::kdtree::{Exit, KdTree, Tree};
 use crate::simd::{Simd, prefetch};
 use flight::{Flight, NONE};
-pub use group::{Begun, Group};
+pub use group::Group;
 use std::cell::Cell;
 use std::hint::select_unpredictable;
 use step::{END, Waiting, step};
@@ -53,6 +53,15 @@ pub trait Answers {
 
     /// A ray that the packet kernel has to trace.
     fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray);
+
+    /// Rays that it has to trace all.
+    #[cold]
+    #[inline(never)]
+    fn all_odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, rays: &[Ray]) {
+        for (number, ray) in rays.iter().enumerate() {
+            self.odd::<M>(tree, number, ray);
+        }
+    }
 }
 
 /// The same where each ray has its answer by itself.
@@ -204,13 +213,12 @@ pub fn trace<S: Simd, M: Mode, A: OneByOne>(
 
 /// Has something done with the thread's stacks.
 #[inline(always)]
-pub fn with_stacks<R>(fly: impl FnOnce(&mut [Waiting; IN_FLIGHT]) -> R) -> R {
+pub fn with_stacks(fly: impl FnOnce(&mut [Waiting; IN_FLIGHT])) {
     // Taken out, not borrowed: a closure of the library's would be compiled without the instruction set.
     let mut stacks = STACKS.take();
-    stacks.resize(IN_FLIGHT, Waiting::new());
-    let done = fly(stacks.first_chunk_mut().expect("as many as rays"));
+    stacks.resize_with(IN_FLIGHT, Waiting::new);
+    fly(stacks.first_chunk_mut().expect("as many as rays"));
     STACKS.set(stacks);
-    done
 }
 
 #[inline(always)]
@@ -222,9 +230,7 @@ fn fly<S: Simd, M: Mode, A: OneByOne>(
 ) {
     let Resident { tree, records } = *resident;
     if !tree.scale().is_none() {
-        for (number, ray) in rays.iter().enumerate() {
-            answers.odd::<M>(resident, number, ray);
-        }
+        answers.all_odd::<M>(resident, rays);
         return;
     }
     let lines = tree.lines();

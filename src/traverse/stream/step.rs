@@ -10,7 +10,7 @@
 //! tell which wall is before an exit and which is behind it: lane 7 is the exit on the near side of all
 //! three, lane 0 on the far side.
 
-use crate::kdtree::{Exit, Line};
+use crate::kdtree::{Exit, Line, Way};
 use crate::simd::{Eight, Mask};
 
 /// A ray as lines see it, `x y z` and a number that means nothing.
@@ -24,9 +24,10 @@ pub struct Crossing {
     pub margin: [f32; 4],
 }
 
-/// The deepest stack of a ray: of the eight exits of each line on a way of [`crate::kdtree::MAX_DEPTH`]
-/// levels all but one wait, and the end of the walk does; and room for eight to be written at once.
-const DEPTH: usize = (crate::kdtree::MAX_DEPTH.div_ceil(3) * 7 + 2 + 8).next_multiple_of(16);
+/// The deepest stack of a ray: of the eight exits of each line, or boxes of each node, on a way of
+/// [`crate::kdtree::MAX_DEPTH`] levels all but one wait, and the end of the walk does; and room for eight to be written
+/// at once. (A line is three levels, a node of boxes can be one.)
+const DEPTH: usize = (crate::kdtree::MAX_DEPTH * 7 + 2 + 8).next_multiple_of(16);
 
 /// What waits for a ray: exits, and its intervals in them.
 #[derive(Clone)]
@@ -53,6 +54,14 @@ impl Waiting {
         }
     }
 
+    /// Has a walk through boxes begin: at the root, and behind it is the end. The top.
+    #[inline(always)]
+    pub fn begin(&mut self) -> usize {
+        (self.exits[0], self.tmin[0]) = (END, f32::NEG_INFINITY);
+        (self.exits[1], self.tmin[1]) = (Way::ROOT.0, f32::NEG_INFINITY);
+        1
+    }
+
     /// A stack with nothing on it.
     pub const fn new() -> Self {
         Self { exits: [END; DEPTH], tmin: [f32::NEG_INFINITY; DEPTH], tmax: [f32::NEG_INFINITY; DEPTH] }
@@ -64,7 +73,7 @@ pub const END: i32 = -1;
 
 /// Eight numbers from `from` on.
 #[inline(always)]
-fn eight<T>(values: &mut [T], from: usize) -> &mut [T; 8] {
+pub fn eight<T>(values: &mut [T], from: usize) -> &mut [T; 8] {
     values[from..].first_chunk_mut().expect("room for eight")
 }
 

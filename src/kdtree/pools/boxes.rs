@@ -1,0 +1,242 @@
+//! The way to the pools: eight boxes at a time.
+//!
+//! A ray that walks a kd-tree by itself has to cross each plane in its way to learn that nothing is beyond. A box around what a
+//! subtree holds says that at once. So between the root and the pools lie nodes of eight boxes, each around one of the
+//! subtrees that a node's subtree is cut into; a ray meets all eight together.
+//!
+//! The boxes are those of the *parts* of triangles that lie in a leaf's cell, so they overlap no more than by roundings, where
+//! boxes around whole triangles would. That is what splits bring to a hierarchy of boxes (Stich, Friedrich & Dietrich,
+//! "Spatial splits in bounding volume hierarchies", 2009), and a kd-tree has nothing else; that wide nodes come of opening the
+//! largest child until there are eight is of Wald, Benthin & Boulos, "Getting rid of packets", 2008.
+//!
+//! ```text
+//!                 +---------------------------+---------------------------+----- ... -----+
+//! faces           | least x of eight boxes    | greatest x                | y, then z     |    192 bytes
+//!                 +---------------------------+---------------------------+----- ... -----+
+//! ways            | of eight boxes            |                                              32 bytes
+//! orders          | for each of eight octants |                                              32 bytes
+//!                 +---------------------------+
+//!
+//!                  31                            0
+//!                 +---+---------------------------+
+//! way             | 1 | ! first word of a pool    |    (-1 is no pool's, as no pool begins at word 0)
+//!                 | 0 | number of a node          |
+//!                 +---+---------------------------+
+//! ```
+//!
+//! **Which box is nearest** is not a question for the ray's parameters: between two boxes there is a plane of the tree. An *order*
+//! has four bits for each lane, the farthest first, that tell which box comes there for rays that run into an octant.
+
+use super::MAX_WORD;
+use crate::geometry::Aabb;
+use crate::geometry::clip::Clipper;
+use crate::geometry::triangle::Triangle;
+use crate::huge;
+use crate::kdtree::Node;
+use rayon::prelude::*;
+
+/// Eight boxes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct Boxes {
+    /// For each axis the least coordinates, and the greatest. A box that is not there begins at infinity and ends at the
+    /// other.
+    pub faces: [[[f32; 8]; 2]; 3],
+    /// [`Way`]s to what is in them. From a box that is not there, the way to [nothing](Way::NOTHING).
+    pub ways: [i32; 8],
+    /// By octant, bit 0 of which is set for rays that run downward along x, and so on.
+    pub orders: [u32; 8],
+}
+
+/// The way to what is in a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Way(pub i32);
+
+impl Way {
+    /// The way to the root.
+    pub const ROOT: Self = Self(0);
+
+    /// The way to a pool without triangles, which lies before all others.
+    pub const NOTHING: Self = Self::to_pool(1);
+
+    /// The way to a pool, by its first word, which is not 0.
+    pub const fn to_pool(word: usize) -> Self {
+        assert!(0 < word && word <= MAX_WORD);
+        Self(!(word as i32))
+    }
+
+    /// Whether it leads to a pool. Otherwise it leads to a node.
+    #[inline(always)]
+    pub const fn is_pool(self) -> bool {
+        self.0 < 0
+    }
+
+    /// The way to a chunk so many words further on.
+    #[inline(always)]
+    pub const fn further(self, words: usize) -> Self {
+        Self(self.0.wrapping_sub(words as i32))
+    }
+
+    /// The pool's first word.
+    #[inline(always)]
+    pub const fn word(self) -> usize {
+        !self.0 as usize
+    }
+
+    /// The node's number.
+    #[inline(always)]
+    pub const fn node(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// Boxes around what the nodes of a tree hold, by node. Leaves name their triangles in `ids`.
+pub fn around(nodes: &[Node], ids: &[u32], triangles: &[Triangle], bounds: &Aabb) -> Vec<Aabb> {
+    let mut leaves = Vec::new();
+    let mut stack = vec![(0, *bounds)];
+    while let Some((index, cell)) = stack.pop() {
+        let node: Node = nodes[index];
+        if node.is_leaf() {
+            leaves.push((index, cell));
+        } else {
+            let below = node.below() as usize;
+            let [low, high] = cell.halves(node.axis(), node.split());
+            stack.extend([(below + 1, high), (below, low)]);
+        }
+    }
+    let clipped = leaves.par_iter().map_init(Clipper::default, |clipper, (index, cell)| {
+        let parts = ids[nodes[*index].references()].iter();
+        let parts = parts.filter_map(|&id| clipper.part(&triangles[id as usize].corners, cell));
+        (*index, parts.fold(Aabb::EMPTY, Aabb::union))
+    });
+    let clipped: Vec<(usize, Aabb)> = clipped.collect();
+    let mut boxes = vec![Aabb::EMPTY; nodes.len()];
+    for (index, part) in clipped {
+        boxes[index] = part;
+    }
+    // Children lie behind their parents.
+    for index in (0..nodes.len()).rev() {
+        if !nodes[index].is_leaf() {
+            let below = nodes[index].below() as usize;
+            boxes[index] = boxes[below].union(boxes[below + 1]);
+        }
+    }
+    boxes
+}
+
+/// Nodes of eight boxes for a tree whose leaves name the first words of their pools; boxes by node. The root is the first;
+/// others lie in the order of a depth-first walk that takes larger boxes first.
+pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
+    let mut packed: Vec<Boxes> = Vec::new();
+    // Inner nodes of the tree, and from where they are led to.
+    let mut stack = vec![(0, None)];
+    while let Some((index, from)) = stack.pop() {
+        let number = packed.len();
+        if let Some((parent, lane)) = from {
+            let parent: &mut Boxes = &mut packed[parent];
+            parent.ways[lane] = number as i32;
+        }
+        let cut = Cut::below(index, nodes, boxes);
+        let (node, mut inner) = cut.node(nodes, boxes);
+        packed.push(node);
+        inner.sort_by(|&(a, _), &(b, _)| boxes[a].area().total_cmp(&boxes[b].area()));
+        stack.extend(inner.into_iter().map(|(index, lane)| (index, Some((number, lane)))));
+    }
+    let mut all = huge::room_for(packed.len());
+    all.extend_from_slice(&packed);
+    all
+}
+
+/// What a subtree is cut into: its upper part, the node of the tree that each part of it is.
+struct Cut {
+    parts: Vec<Part>,
+    /// Parts that are not cut.
+    whole: usize,
+}
+
+/// A part of a subtree.
+#[derive(Clone, Copy)]
+enum Part {
+    /// A node of the tree, for one box.
+    Whole(usize),
+    /// Two parts on the two sides of a plane across an axis.
+    Halves { axis: usize, low: usize, high: usize },
+}
+
+impl Cut {
+    /// The largest box is cut in two, until there are eight, or none that can be.
+    fn below(index: usize, nodes: &[Node], boxes: &[Aabb]) -> Self {
+        let mut cut = Self { parts: vec![Part::Whole(index)], whole: 1 };
+        while cut.whole < 8 {
+            let inner = cut.parts.iter().enumerate().filter_map(|(place, part)| match part {
+                Part::Whole(index) if !nodes[*index].is_leaf() => Some((place, *index)),
+                _ => None,
+            });
+            let largest = inner.max_by(|(_, a), (_, b)| boxes[*a].area().total_cmp(&boxes[*b].area()));
+            let Some((place, index)) = largest else { break };
+            let below = nodes[index].below() as usize;
+            cut.parts[place] = match [below, below + 1].map(|child| boxes[child].is_empty()) {
+                // (Where both are empty, so was the whole.)
+                [true, _] => Part::Whole(below + 1),
+                [_, true] => Part::Whole(below),
+                [false, false] => {
+                    let low = cut.parts.len();
+                    cut.parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
+                    cut.whole += 1;
+                    Part::Halves { axis: nodes[index].axis(), low, high: low + 1 }
+                }
+            };
+        }
+        cut
+    }
+
+    /// The node, in which ways to other nodes are not filled in; and the inner nodes of the tree that those lead to, with
+    /// their lanes.
+    fn node(&self, nodes: &[Node], boxes: &[Aabb]) -> (Boxes, Vec<(usize, usize)>) {
+        let mut node = Boxes {
+            faces: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3],
+            ways: [Way::NOTHING.0; 8],
+            orders: [0; 8],
+        };
+        let mut lanes = Vec::with_capacity(8);
+        self.visit(0, 0, &mut |index| lanes.push(index));
+        let mut inner = Vec::new();
+        for (lane, &index) in lanes.iter().enumerate() {
+            let Aabb { min, max } = boxes[index];
+            for axis in 0..3 {
+                (node.faces[axis][0][lane], node.faces[axis][1][lane]) = (min[axis], max[axis]);
+            }
+            match nodes[index].is_leaf() {
+                true if boxes[index].is_empty() => {}
+                true => node.ways[lane] = Way::to_pool(nodes[index].references().start).0,
+                false => inner.push((index, lane)),
+            }
+        }
+        for (octant, order) in node.orders.iter_mut().enumerate() {
+            let mut place = lanes.len();
+            self.visit(0, octant, &mut |index| {
+                let lane =
+                    lanes.iter().position(|&other| other == index).expect("parts are the same in all orders");
+                place -= 1;
+                *order |= (lane as u32) << (4 * place);
+            });
+            for place in lanes.len()..8 {
+                *order |= (place as u32) << (4 * place);
+            }
+        }
+        (node, inner)
+    }
+
+    /// Visits the parts that are not cut in the order in which rays into an octant come to them.
+    fn visit(&self, place: usize, octant: usize, visit: &mut impl FnMut(usize)) {
+        match self.parts[place] {
+            Part::Whole(index) => visit(index),
+            Part::Halves { axis, low, high } => {
+                let runs_down = octant >> axis & 1 == 1;
+                let [first, second] = if runs_down { [high, low] } else { [low, high] };
+                self.visit(first, octant, visit);
+                self.visit(second, octant, visit);
+            }
+        }
+    }
+}

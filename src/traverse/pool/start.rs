@@ -1,0 +1,94 @@
+//! Rays made ready, eight together.
+
+use super::step::{Slabs, thick};
+use crate::geometry::{Aabb, Ray};
+use crate::simd::{Eight, Mask};
+use crate::traverse::ready::Ready;
+
+/// Eight rays about to start, number by number.
+pub struct Starts {
+    inverse: [[f32; 8]; 3],
+    near: [[f32; 8]; 3],
+    far: [[f32; 8]; 3],
+    octants: [u32; 8],
+    reach: [f32; 8],
+    tfar: [f32; 8],
+    /// Rays that meet the bounds.
+    pub flies: u32,
+    /// Rays whose numbers lie near the ends of the floats' range, or that are none.
+    pub odd: u32,
+}
+
+impl Starts {
+    /// Prepares up to eight rays.
+    #[inline(always)]
+    pub fn new<L: Eight>(rays: &[Ray], bounds: &Aabb) -> Self {
+        let present = (1u32 << rays.len().min(8)) - 1;
+        let ([x, y, z, tnear], [dx, dy, dz, tfar]) = columns::<L>(rays);
+        let origin = [x, y, z];
+        let Ready { inverse, reach, margin, closest, ordinary, flies, .. } =
+            Ready::new(&origin, &[dx, dy, dz], tnear, tfar, bounds);
+        let ([mut near, mut far], mut octants) = ([[[0.0; 8]; 3]; 2], [0; 8]);
+        for axis in 0..3 {
+            let [less, more] = thick(origin[axis], inverse[axis], margin[axis]);
+            (near[axis], far[axis]) = (less.store(), more.store());
+            let down = inverse[axis].lt(L::splat(0.0)).bits();
+            for (lane, octant) in octants.iter_mut().enumerate() {
+                *octant |= (down >> lane & 1) << axis;
+            }
+        }
+        Self {
+            inverse: [inverse[0].store(), inverse[1].store(), inverse[2].store()],
+            near,
+            far,
+            octants,
+            reach: reach.store(),
+            tfar: closest.store(),
+            flies: flies & present,
+            odd: !ordinary & present,
+        }
+    }
+
+    /// The ray in a lane as boxes see it.
+    #[inline(always)]
+    pub fn slabs(&self, lane: usize) -> Slabs {
+        let three = |rows: &[[f32; 8]; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
+        Slabs {
+            inverse: three(&self.inverse),
+            near: three(&self.near),
+            far: three(&self.far),
+            octant: self.octants[lane],
+        }
+    }
+
+    /// How far the scene reaches from its origin, and what a hit must not lie beyond.
+    #[inline(always)]
+    pub fn reach_and_tfar(&self, lane: usize) -> [f32; 2] {
+        [self.reach[lane], self.tfar[lane]]
+    }
+}
+
+/// Up to eight rays, number by number: origins and `tnear`, directions and `tfar`. Lanes without a ray hold the first one.
+#[inline(always)]
+fn columns<L: Eight>(rays: &[Ray]) -> ([L; 4], [L; 4]) {
+    let nowhere = &[0.0; 4];
+    let (mut starts, mut ways) = ([nowhere; 8], [nowhere; 8]);
+    for lane in 0..8 {
+        if let Some(ray) = rays.get(lane).or(rays.first()) {
+            let [start, way]: &[[f32; 4]; 2] = bytemuck::cast_ref(ray);
+            (starts[lane], ways[lane]) = (start, way);
+        }
+    }
+    (turned(&starts), turned(&ways))
+}
+
+/// Rows and columns exchanged: lane `j` of vector `i` is number `i` of `fours[j]`.
+#[inline(always)]
+fn turned<L: Eight>(fours: &[&[f32; 4]; 8]) -> [L; 4] {
+    L::transpose_fours([
+        L::of_fours([fours[0], fours[4]]),
+        L::of_fours([fours[1], fours[5]]),
+        L::of_fours([fours[2], fours[6]]),
+        L::of_fours([fours[3], fours[7]]),
+    ])
+}

@@ -1,0 +1,235 @@
+//! One ray through one node: eight boxes at once.
+//!
+//! The ray meets the three near faces and the three far faces of each box, and goes into those that it enters before it
+//! leaves them (Kay & Kajiya, "Ray tracing complex scenes", 1986). They are put on its stack, the farthest first,
+//! with the places where it enters them.
+//!
+//! **Faces are as thick as walls.** What [`walk`](crate::traverse::walk) says of the planes of cells holds for boxes around
+//! what lies in a cell, too: the point of a hit lies within 16 roundings of the scene's reach of a point of the triangle, that
+//! point lies in a box, and faces are 32 such roundings away from where they are. But a face's parameter is computed as
+//! `face * inverse - origin * inverse` here, which is off by some roundings of `origin`'s coordinate, however near the face is;
+//! so eight roundings of that are added. A NaN, which comes of numbers that overflow, is no face that stops a ray:
+//! such a ray goes into boxes for nothing.
+
+use crate::kdtree::Boxes;
+use crate::simd::{Eight, Lanes, Mask};
+use crate::traverse::stream::step::{Waiting, eight};
+
+/// Eight roundings.
+const SLIP: f32 = 1.0 / (1 << 21) as f32;
+
+/// A ray as boxes see it.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct Slabs {
+    /// 1 / direction.
+    pub inverse: [f32; 3],
+    /// What is added for near faces, and for far ones: `-origin / direction`, and their thickness.
+    pub near: [f32; 3],
+    pub far: [f32; 3],
+    /// A bit for each axis along which the ray runs downward.
+    pub octant: u32,
+}
+
+impl Slabs {
+    /// Of a ray from an origin, with 1 / direction and the walls' half-thickness in units of the parameter.
+    #[inline(always)]
+    pub fn new(origin: &[f32; 3], inverse: &[f32; 3], margin: &[f32; 3]) -> Self {
+        let mut slabs = Self { inverse: *inverse, ..Self::default() };
+        for axis in 0..3 {
+            [slabs.near[axis], slabs.far[axis]] = thick(origin[axis], inverse[axis], margin[axis]);
+            slabs.octant |= u32::from(inverse[axis] < 0.0) << axis;
+        }
+        slabs
+    }
+}
+
+/// What is added for the near faces and for the far faces across an axis.
+#[inline(always)]
+pub fn thick<const W: usize, L: Lanes<W>>(origin: L, inverse: L, margin: L) -> [L; 2] {
+    let zero = L::splat(0.0);
+    let margin = (origin * inverse).abs().mul_add(L::splat(SLIP), margin);
+    [zero - origin * inverse - margin, margin - origin * inverse]
+}
+
+/// Takes the node on top of a stack, puts there the boxes that the ray goes into between its ends, and gives the new top.
+#[inline(always)]
+pub fn step<L: Eight>(
+    nodes: &[Boxes],
+    ray: &Slabs,
+    waiting: &mut Waiting,
+    top: usize,
+    tnear: f32,
+    tfar: f32,
+) -> usize {
+    let Boxes { faces: [x, y, z], ways, orders } = &nodes[waiting.exits[top] as usize];
+    // Where the ray enters each box, and where it leaves it.
+    let octant = ray.octant as usize;
+    let [down_x, down_y, down_z] = [octant & 1, octant >> 1 & 1, octant >> 2 & 1];
+    let [inverse_x, inverse_y, inverse_z] = ray.inverse.map(L::splat);
+    let enters_x = L::load(&x[down_x]).mul_add(inverse_x, L::splat(ray.near[0]));
+    let enters_y = L::load(&y[down_y]).mul_add(inverse_y, L::splat(ray.near[1]));
+    let enters_z = L::load(&z[down_z]).mul_add(inverse_z, L::splat(ray.near[2]));
+    let leaves_x = L::load(&x[down_x ^ 1]).mul_add(inverse_x, L::splat(ray.far[0]));
+    let leaves_y = L::load(&y[down_y ^ 1]).mul_add(inverse_y, L::splat(ray.far[1]));
+    let leaves_z = L::load(&z[down_z ^ 1]).mul_add(inverse_z, L::splat(ray.far[2]));
+    // (`max` and `min` keep a NaN that stands on their right.)
+    let enters = enters_x.max(enters_y).max(enters_z.max(L::splat(tnear)));
+    let leaves = leaves_x.min(leaves_y).min(leaves_z.min(L::splat(tfar)));
+
+    // The farthest first.
+    let order = L::ids_nibbles(orders[octant & 7]);
+    let (enters, leaves) = (enters.pick(order), leaves.pick(order));
+    let bits = enters.le(leaves).bits() & 0xff;
+    L::ids_compact(L::ids_pick(L::ids_load(ways), order), bits, eight(&mut waiting.exits, top));
+    enters.compact(bits, eight(&mut waiting.tmin, top));
+    top + bits.count_ones() as usize - 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::start::Starts;
+    use super::*;
+    use crate::geometry::{Aabb, Ray};
+    use crate::kdtree::Way;
+    use crate::simd::{Chosen, Isa, Simd, Task};
+    use glam::Vec3;
+
+    /// A ray's ways out of a node, the next one last, and where it enters the boxes.
+    struct Out<'a>(&'a Boxes, &'a Ray, &'a Aabb);
+
+    impl Task for Out<'_> {
+        type Output = Vec<(i32, f32)>;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Self::Output {
+            let Self(node, ray, bounds) = self;
+            let starts = Starts::new::<S::F8>(&[*ray], bounds);
+            assert_eq!(starts.odd, 0);
+            if starts.flies == 0 {
+                return Vec::new();
+            }
+            let mut waiting = Waiting::new();
+            waiting.exits[3] = Way::ROOT.0;
+            let nodes = std::slice::from_ref(node);
+            let top = step::<S::F8>(nodes, &starts.slabs(0), &mut waiting, 3, ray.tnear, ray.tfar);
+            (3..=top).map(|place| (waiting.exits[place], waiting.tmin[place])).collect()
+        }
+    }
+
+    /// Two rows of four cubes, a width apart, that begin at a corner. In the order of octant 0.
+    fn cubes(corner: Vec3, width: f32) -> Boxes {
+        let mut node =
+            Boxes { faces: [[[0.0; 8]; 2]; 3], ways: std::array::from_fn(|i| 10 + i as i32), orders: [0; 8] };
+        for lane in 0..8 {
+            let least = corner + width * Vec3::new((lane / 2 * 2) as f32, (lane % 2 * 2) as f32, 0.0);
+            for axis in 0..3 {
+                (node.faces[axis][0][lane], node.faces[axis][1][lane]) = (least[axis], least[axis] + width);
+            }
+        }
+        for (octant, order) in node.orders.iter_mut().enumerate() {
+            // The farthest first.
+            let flipped = (octant & 1) * 6 + (octant >> 1 & 1);
+            *order =
+                (0..8).fold(0, |order, place| order | ((7 - place) as u32 ^ flipped as u32) << (4 * place));
+        }
+        node
+    }
+
+    /// Numbers between -1 and 1.
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 0.0f64;
+        move || {
+            state = (state + 0.618_033_988_749_895).fract();
+            (state * 2.0 - 1.0) as f32
+        }
+    }
+
+    #[test]
+    fn a_ray_enters_each_box_that_it_touches_the_nearest_last_and_few_others() {
+        let mut number = numbers();
+        let (mut entered, mut touched) = (0, 0);
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            for round in 0..3000 {
+                // Near the origin of all coordinates or far away; some rays run along an axis, or next to it.
+                let corner = Vec3::splat([0.0, 3.0, 1000.0, -70_000.0][round % 4]);
+                let width = [1.0, 0.125, 16.0][round / 4 % 3];
+                let node = cubes(corner, width);
+                let bounds = Aabb { min: corner, max: corner + width * Vec3::new(7.0, 3.0, 1.0) };
+                let flat = Vec3::from(
+                    [[1.0; 3], [1.0, 0.0, 1.0], [-0.0, 1e-20, 1.0], [1.0, 1e-9, -0.0]][round / 12 % 4],
+                );
+                let direction = Vec3::new(number(), number(), number()) * flat;
+                let part = Vec3::new(number(), number(), number()) * 0.5 + 0.5;
+                let aim = bounds.min + bounds.extent() * part;
+                let origin = aim - direction * (number() * 2.0 + 2.0) * width;
+                let tfar = if round % 5 == 0 { 2.0 * width } else { f32::MAX };
+                let ray = Ray::segment(origin, direction, 0.0, tfar);
+                let meets = |slack: f64| -> Vec<(i32, f64)> {
+                    let mut met = Vec::new();
+                    for lane in 0..8 {
+                        let (mut tmin, mut tmax) = (0.0, f64::from(ray.tfar));
+                        for axis in 0..3 {
+                            let [o, d] = [origin, ray.direction].map(|v| f64::from(v[axis]));
+                            let [least, greatest] = node.faces[axis].map(|row| f64::from(row[lane]));
+                            let [least, greatest] = [least - slack - o, greatest + slack - o];
+                            if d == 0.0 {
+                                if least > 0.0 || greatest < 0.0 {
+                                    tmax = -1.0;
+                                }
+                                continue;
+                            }
+                            let (a, b) = (least / d, greatest / d);
+                            (tmin, tmax) = (a.min(b).max(tmin), a.max(b).min(tmax));
+                        }
+                        if tmin <= tmax {
+                            met.push((10 + lane as i32, tmin));
+                        }
+                    }
+                    met
+                };
+                let reach =
+                    f64::from((bounds.max - origin).abs().max((bounds.min - origin).abs()).max_element());
+                let far = reach + f64::from(origin.abs().max_element());
+                let out = chosen.run(Out(&node, &ray, &bounds));
+                let about = format!("{isa}, {ray:?}, {node:?}, {out:?}");
+                // What a hit lies at is within sixteen roundings of its triangle.
+                let [sure, perhaps] = [meets(reach * 2f64.powi(-20)), meets(far * 2f64.powi(-17))];
+                for (way, tmin) in &sure {
+                    let found = out.iter().find(|(other, _)| other == way);
+                    let (_, enters) = found.unwrap_or_else(|| panic!("{way} is not entered: {about}"));
+                    assert!(f64::from(*enters) <= tmin + 1e-30, "{way} is entered late: {about}");
+                }
+                for (way, _) in &out {
+                    assert!(perhaps.iter().any(|(other, _)| other == way), "{way} is entered: {about}");
+                }
+                let order: Vec<f64> = out
+                    .iter()
+                    .filter_map(|(way, _)| sure.iter().find(|(other, _)| other == way).map(|(_, tmin)| *tmin))
+                    .collect();
+                assert!(order.is_sorted_by(|a, b| a >= b), "the nearest is last: {about}");
+                if round % 4 < 2 {
+                    (entered, touched) = (entered + out.len(), touched + sure.len());
+                }
+            }
+        }
+        assert!(touched > 1500 && entered < touched + touched / 50, "{entered} entered, {touched} touched");
+    }
+
+    #[test]
+    fn numbers_that_overflow_stop_no_ray() {
+        let mut node = cubes(Vec3::ZERO, 1.0);
+        node.faces = [[[-3e38; 8], [3e38; 8]]; 3];
+        let bounds = Aabb { min: Vec3::splat(-3e38), max: Vec3::splat(3e38) };
+        for isa in Isa::available() {
+            let chosen = Chosen::new(isa).expect("it is available");
+            for direction in
+                [Vec3::new(1.0, 1e-12, 0.0), Vec3::new(-1e-8, 0.0, 1e-9), Vec3::new(0.0, 1.0, -1e9)]
+            {
+                let ray = Ray::new(Vec3::new(3e38, -3e38, 1e38), direction);
+                assert_eq!(chosen.run(Out(&node, &ray, &bounds)).len(), 8, "{isa}, {direction}");
+            }
+        }
+    }
+}
