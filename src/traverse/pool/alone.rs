@@ -32,7 +32,8 @@ pub fn trace<S: Simd, M: Mode, A: Told>(
         answers.missed(0);
     } else {
         let slabs = Slabs::new(&origin, &ready.inverse, &ready.margin);
-        let mut flight = Flight::new(slabs, [ready.reach, ready.closest], ray, 0);
+        let mut flight = Flight::NONE;
+        flight.begin(slabs, [ready.reach, ready.closest], ray, 0);
         with_stacks(
             #[inline(always)]
             |[waiting, ..]| {
@@ -55,16 +56,16 @@ fn walk<S: Simd, M: Mode, A: Told>(
     flight: &mut Flight,
     waiting: &mut Waiting,
 ) -> bool {
-    let mut top = waiting.begin();
+    let (mut top, mut way) = (waiting.begin(), Way::ROOT);
     loop {
-        let way = Way(waiting.exits[top]);
         if !way.is_pool() {
             let Flight { slabs, tnear, tfar, .. } = flight;
-            top = step::<S::F8>(pools.nodes(), slabs, waiting, top, *tnear, *tfar);
+            (top, way) = step::<S::F8>(pools.nodes(), slabs, waiting, (top, way), *tnear, *tfar);
         } else if way.0 == END {
             return false;
         } else {
-            let Finds { possible, certain, next } = flight.look::<S::F16, M>(pools.words(), way.word());
+            let Finds { possible, certain, next } =
+                flight.look::<S::F16, M>(pools.words(), way.word(), A::ANY);
             if A::ANY && certain {
                 return true;
             }
@@ -76,6 +77,7 @@ fn walk<S: Simd, M: Mode, A: Told>(
                 }
                 top = waiting.reached::<S::F8>(top, flight.tfar);
             }
+            way = Way(waiting.exits[top]);
         }
     }
 }

@@ -43,12 +43,26 @@ pub struct Finds {
 }
 
 impl Flight {
-    /// A ray that has found nothing.
+    /// None.
+    pub const NONE: Self = Self {
+        slabs: Slabs::NONE,
+        pooled: Pooled::NONE,
+        top: 0,
+        ray: 0,
+        tnear: 0.0,
+        tfar: 0.0,
+        count: 0,
+        ids: [0; 2 * MOST],
+        first: [0.0; 2 * MOST],
+    };
+
+    /// Becomes a ray that has found nothing.
     #[inline(always)]
-    pub fn new(slabs: Slabs, [reach, tfar]: [f32; 2], ray: &Ray, number: usize) -> Self {
-        let pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), reach);
-        let (ids, first) = ([0; 2 * MOST], [0.0; 2 * MOST]);
-        Self { slabs, pooled, top: 1, ray: number as u32, tnear: ray.tnear, tfar, count: 0, ids, first }
+    pub fn begin(&mut self, slabs: Slabs, [reach, tfar]: [f32; 2], ray: &Ray, number: usize) {
+        self.slabs = slabs;
+        self.pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), reach);
+        (self.top, self.ray, self.count) = (1, number as u32, 0);
+        (self.tnear, self.tfar) = (ray.tnear, tfar);
     }
 
     /// Whether the list has no room for another chunk's triangles.
@@ -57,9 +71,10 @@ impl Flight {
         self.count > MOST as u32
     }
 
-    /// Looks at the chunk that begins at a word, and lists what the ray may hit.
+    /// Looks at the chunk that begins at a word, and lists what the ray may hit. With `any`, nobody asks any more where the
+    /// ray ends once it hits something for certain.
     #[inline(always)]
-    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize) -> Finds {
+    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize, any: bool) -> Finds {
         let chunk = Chunk::at(words, first);
         let triangles = Sixteens {
             rows: self.pooled.renamed().map(|axis| chunk.row(axis)),
@@ -71,7 +86,9 @@ impl Flight {
         } else {
             self.pooled.prospects::<L, false>(&triangles, self.tnear, self.tfar)
         };
-        self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
+        if !any {
+            self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
+        }
         let (possible, certain) = (possible.bits(), certain.bits());
         let at = (self.count as usize).min(MOST);
         first.compact(possible, self.first[at..].first_chunk_mut().expect("room for a chunk's"));

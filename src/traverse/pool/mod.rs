@@ -1,16 +1,18 @@
 //! The pool kernel: many rays in flight, each alone, over leaves that hold their corners.
 //!
 //! As the [stream kernel](super::stream) it has some thirty rays on their way at once, and each round does one piece of
-//! work for each: a line of the tree, or a chunk of up to sixteen triangles ([`crate::kdtree::Pools`]). What it does not do is
-//! to ask the mode's test of each triangle: what a ray may hit is kept ([`flight`]), and in the end the test is asked of the
-//! one or two triangles that are left, sixteen of them at a time ([`answers`]).
+//! work for each: a node of eight boxes ([`step`]), or a chunk of up to sixteen triangles ([`crate::kdtree::Pools`]). What it does
+//! not do is to ask the mode's test of each triangle: what a ray may hit is kept ([`flight`]), and in the end the test is
+//! asked of the one or two triangles that are left, sixteen of them at a time ([`answers`]).
 //!
 //! ```text
-//!          +---------+-------------------------------+
-//!          v         v               nothing         |
-//! start -> lines -> leaves -> chunks --------> (next of the leaf or on the stack) -> end -> answers: the next ray starts
-//!  fetch:  line     chunk        \-> found --------->^                              records
+//!          +-------+----------------------------------+
+//!          v       v              nothing             |
+//! start -> nodes, chunks --------------------> (the pool's next chunk, or what is next on the stack) -> end -> answers:
+//!  fetch:  node   chunk  \-> found: shortened ------>^                                              records  the next starts
 //! ```
+//!
+//! A ray that comes by itself goes the same way, and nobody else does meanwhile ([`alone`]).
 //!
 //! Hits are those of the other kernels, to the bit. Only the modes whose test is told ahead by
 //! [`Pooled`](crate::geometry::triangle::pooled::Pooled) have this kernel: watertight and exact.
@@ -88,7 +90,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
         return;
     }
     let (nodes, words) = (pools.nodes(), pools.words());
-    let mut flights: Vec<Flight> = Vec::with_capacity(IN_FLIGHT);
+    let mut flights = [Flight::NONE; IN_FLIGHT];
     let ways = Ways { nodes, words };
     // Rays that wait for the same: those that are at a node; at a chunk, or their end; that found something; that hit
     // something, where any hit will do.
@@ -110,23 +112,17 @@ fn fly<S: Simd, M: Mode, A: Told>(
                     answers.missed(number);
                 } else {
                     let k = free.pop().expect("as many as rays");
-                    let flight = Flight::new(starts.slabs(lane), starts.reach_and_tfar(lane), ray, number);
+                    flights[k].begin(starts.slabs(lane), starts.reach_and_tfar(lane), ray, number);
                     stacks[k].begin();
                     at_node.put_if(k, true);
-                    if flights.is_empty() {
-                        // The others are written over before they are looked at.
-                        flights.resize(IN_FLIGHT, flight);
-                    }
-                    flights[k] = flight;
                 }
             }
             ahead += eight.len();
         }
-        // (Fixed in length, so that no ray's number has to be checked.)
-        let Some(flights) = flights.first_chunk_mut::<IN_FLIGHT>().filter(|_| free != Set::ALL) else {
+        if free == Set::ALL {
             answers.finish::<S, M>(resident, rays, &mut pairs);
             return;
-        };
+        }
 
         // Chunks, whose words are here by now, and rays that have ended. Where nothing is found, a ray goes on with the next
         // chunk of its pool, or with what is next on its stack.
@@ -139,7 +135,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
                 free.put_if(k, true);
                 continue;
             }
-            let Finds { possible, certain, next } = flight.look::<S::F16, M>(words, way.word());
+            let Finds { possible, certain, next } = flight.look::<S::F16, M>(words, way.word(), A::ANY);
             waiting.exits[top] = way.further(next).0;
             flight.top -= u32::from(next == 0);
             let ends = A::ANY & certain;
@@ -174,9 +170,10 @@ fn fly<S: Simd, M: Mode, A: Told>(
         while let Some(k) = here.pop() {
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
-            let top = step::<S::F8>(nodes, &flight.slabs, waiting, top, flight.tnear, flight.tfar);
+            let at = (top, Way(waiting.exits[top]));
+            let (top, way) = step::<S::F8>(nodes, &flight.slabs, waiting, at, flight.tnear, flight.tfar);
             flight.top = top as u32;
-            at_chunk.put_if(k, ways.fetch(waiting.exits[top]));
+            at_chunk.put_if(k, ways.fetch(way.0));
         }
         at_node = at_node.without(at_chunk);
     }

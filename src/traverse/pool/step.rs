@@ -11,15 +11,16 @@
 //! so eight roundings of that are added. A NaN, which comes of numbers that overflow, is no face that stops a ray:
 //! such a ray goes into boxes for nothing.
 
-use crate::kdtree::Boxes;
+use crate::kdtree::{Boxes, Way};
 use crate::simd::{Eight, Lanes, Mask};
 use crate::traverse::stream::step::{Waiting, eight};
+use std::hint::select_unpredictable;
 
 /// Eight roundings.
 const SLIP: f32 = 1.0 / (1 << 21) as f32;
 
 /// A ray as boxes see it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Slabs {
     /// 1 / direction.
@@ -32,10 +33,13 @@ pub struct Slabs {
 }
 
 impl Slabs {
+    /// Those of no ray.
+    pub const NONE: Self = Self { inverse: [0.0; 3], near: [0.0; 3], far: [0.0; 3], octant: 0 };
+
     /// Of a ray from an origin, with 1 / direction and the walls' half-thickness in units of the parameter.
     #[inline(always)]
     pub fn new(origin: &[f32; 3], inverse: &[f32; 3], margin: &[f32; 3]) -> Self {
-        let mut slabs = Self { inverse: *inverse, ..Self::default() };
+        let mut slabs = Self { inverse: *inverse, ..Self::NONE };
         for axis in 0..3 {
             [slabs.near[axis], slabs.far[axis]] = thick(origin[axis], inverse[axis], margin[axis]);
             slabs.octant |= u32::from(inverse[axis] < 0.0) << axis;
@@ -52,17 +56,18 @@ pub fn thick<const W: usize, L: Lanes<W>>(origin: L, inverse: L, margin: L) -> [
     [zero - origin * inverse - margin, margin - origin * inverse]
 }
 
-/// Takes the node on top of a stack, puts there the boxes that the ray goes into between its ends, and gives the new top.
+/// Takes a node, which was on top of a stack, puts there the boxes that the ray goes into between its ends, and gives the new
+/// top and what is there.
 #[inline(always)]
 pub fn step<L: Eight>(
     nodes: &[Boxes],
     ray: &Slabs,
     waiting: &mut Waiting,
-    top: usize,
+    (top, way): (usize, Way),
     tnear: f32,
     tfar: f32,
-) -> usize {
-    let Boxes { faces: [x, y, z], ways, orders } = &nodes[waiting.exits[top] as usize];
+) -> (usize, Way) {
+    let Boxes { faces: [x, y, z], ways, orders } = &nodes[way.node()];
     // Where the ray enters each box, and where it leaves it.
     let octant = ray.octant as usize;
     let [down_x, down_y, down_z] = [octant & 1, octant >> 1 & 1, octant >> 2 & 1];
@@ -78,12 +83,17 @@ pub fn step<L: Eight>(
     let leaves = leaves_x.min(leaves_y).min(leaves_z.min(L::splat(tfar)));
 
     // The farthest first.
-    let order = L::ids_nibbles(orders[octant & 7]);
+    let nibbles = orders[octant & 7];
+    let order = L::ids_nibbles(nibbles);
     let (enters, leaves) = (enters.pick(order), leaves.pick(order));
     let bits = enters.le(leaves).bits() & 0xff;
     L::ids_compact(L::ids_pick(L::ids_load(ways), order), bits, eight(&mut waiting.exits, top));
     enters.compact(bits, eight(&mut waiting.tmin, top));
-    top + bits.count_ones() as usize - 1
+    // What is on top now is known before it can be read there.
+    let before = waiting.exits[top - 1];
+    let nearest = ways[(nibbles >> (4 * (bits | 1).ilog2()) & 7) as usize];
+    let way = select_unpredictable(bits == 0, before, nearest);
+    (top + bits.count_ones() as usize - 1, Way(way))
 }
 
 #[cfg(test)]
@@ -91,7 +101,6 @@ mod tests {
     use super::super::start::Starts;
     use super::*;
     use crate::geometry::{Aabb, Ray};
-    use crate::kdtree::Way;
     use crate::simd::{Chosen, Isa, Simd, Task};
     use glam::Vec3;
 
@@ -112,7 +121,9 @@ mod tests {
             let mut waiting = Waiting::new();
             waiting.exits[3] = Way::ROOT.0;
             let nodes = std::slice::from_ref(node);
-            let top = step::<S::F8>(nodes, &starts.slabs(0), &mut waiting, 3, ray.tnear, ray.tfar);
+            let at = (3, Way::ROOT);
+            let (top, way) = step::<S::F8>(nodes, &starts.slabs(0), &mut waiting, at, ray.tnear, ray.tfar);
+            assert_eq!(way.0, waiting.exits[top]);
             (3..=top).map(|place| (waiting.exits[place], waiting.tmin[place])).collect()
         }
     }

@@ -30,7 +30,7 @@ const BLUR: f32 = 1.0 / (1 << 16) as f32;
 const DOUBT: f32 = 1.0 / (1 << 20) as f32;
 
 /// A ray as pools see it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Pooled {
     /// The origin and the shear, in renamed coordinates.
@@ -65,6 +65,9 @@ pub struct Sixteens<'a> {
 }
 
 impl Pooled {
+    /// That of no ray.
+    pub const NONE: Self = Self { origin: [0.0; 3], shear: [0.0; 3], axes: [0; 4], reach: 0.0 };
+
     /// Prepares a ray from whose origin the scene reaches so far.
     #[inline(always)]
     pub fn new(origin: &[f32; 3], direction: &[f32; 3], reach: f32) -> Self {
