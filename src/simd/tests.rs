@@ -103,6 +103,10 @@ fn check_eight<L: Eight>() {
         let narrow = places.map(|place| place as u16);
         assert_eq!(L::ids_store(L::ids_widen(&narrow)), narrow.map(i32::from));
 
+        let nibbles = bits.wrapping_mul(2654435761);
+        let apart = std::array::from_fn(|lane| (nibbles >> (4 * lane)) as i32);
+        assert_eq!(L::ids_store(L::ids_nibbles(nibbles)), apart);
+
         let (mut values, mut kept) = ([0.0; 8], [0; 8]);
         x.compact(bits, &mut values);
         L::ids_compact(ids, bits, &mut kept);
