@@ -82,6 +82,8 @@ mod stage;
 pub mod store;
 pub mod study;
 pub mod traverse;
+#[cfg(test)]
+mod weyl;
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -147,12 +147,11 @@ pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
     all
 }
 
-/// What a subtree is cut into: its upper part, the node of the tree that each part of it is.
-struct Cut {
-    parts: Vec<Part>,
-    /// Parts that are not cut.
-    whole: usize,
-}
+/// What a subtree is cut into: all of it first, and parts behind those that they are halves of.
+struct Cut(Vec<Part>);
+
+/// Eight parts, and seven that are cut.
+const FULL: usize = 15;
 
 /// A part of a subtree.
 #[derive(Clone, Copy)]
@@ -166,28 +165,27 @@ enum Part {
 impl Cut {
     /// The largest box is cut in two, until there are eight, or none that can be.
     fn below(index: usize, nodes: &[Node], boxes: &[Aabb]) -> Self {
-        let mut cut = Self { parts: vec![Part::Whole(index)], whole: 1 };
-        while cut.whole < 8 {
-            let inner = cut.parts.iter().enumerate().filter_map(|(place, part)| match part {
+        let mut parts = vec![Part::Whole(index)];
+        while parts.len() < FULL {
+            let inner = parts.iter().enumerate().filter_map(|(place, part)| match part {
                 Part::Whole(index) if !nodes[*index].is_leaf() => Some((place, *index)),
                 _ => None,
             });
             let largest = inner.max_by(|(_, a), (_, b)| boxes[*a].area().total_cmp(&boxes[*b].area()));
             let Some((place, index)) = largest else { break };
             let below = nodes[index].below() as usize;
-            cut.parts[place] = match [below, below + 1].map(|child| boxes[child].is_empty()) {
+            parts[place] = match [below, below + 1].map(|child| boxes[child].is_empty()) {
                 // (Where both are empty, so was the whole.)
                 [true, _] => Part::Whole(below + 1),
                 [_, true] => Part::Whole(below),
                 [false, false] => {
-                    let low = cut.parts.len();
-                    cut.parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
-                    cut.whole += 1;
+                    let low = parts.len();
+                    parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
                     Part::Halves { axis: nodes[index].axis(), low, high: low + 1 }
                 }
             };
         }
-        cut
+        Self(parts)
     }
 
     /// The node, in which ways to other nodes are not filled in; and the inner nodes of the tree that those lead to, with
@@ -229,7 +227,7 @@ impl Cut {
 
     /// Visits the parts that are not cut in the order in which rays into an octant come to them.
     fn visit(&self, place: usize, octant: usize, visit: &mut impl FnMut(usize)) {
-        match self.parts[place] {
+        match self.0[place] {
             Part::Whole(index) => visit(index),
             Part::Halves { axis, low, high } => {
                 let runs_down = octant >> axis & 1 == 1;

@@ -2,6 +2,7 @@ use super::*;
 use crate::kdtree::{BuildParams, Tree};
 use crate::mesh::Mesh;
 use crate::mesh::generate::shapes;
+use crate::weyl::uniform;
 use glam::Vec3;
 
 /// A triangle's id, and its corners.
@@ -57,22 +58,13 @@ fn tree_of(mesh: &Mesh) -> KdTree {
     tree
 }
 
-/// Numbers between 0 and 1.
-fn numbers() -> impl FnMut() -> f32 {
-    let mut part = 0.0f64;
-    move || {
-        part = (part + 0.618_033_988_749_895).fract();
-        part as f32
-    }
-}
-
 #[test]
 fn every_point_of_a_triangle_lies_in_a_box_around_a_pool_that_holds_it() {
     for mesh in [shapes::soup(3000, 1), shapes::soup(20, 2), shapes::soup(1, 3)] {
         let tree = tree_of(&mesh);
         let pools = tree.pools().expect("they are made");
         let slack = tree.bounds().extent().max_element() / (1 << 22) as f32;
-        let mut number = numbers();
+        let mut number = uniform(0.0, 1.0);
         for (id, triangle) in tree.triangles().iter().enumerate() {
             let [a, b, c] = triangle.corners.map(Vec3::from_array);
             for _ in 0..8 {
@@ -90,7 +82,7 @@ fn every_point_of_a_triangle_lies_in_a_box_around_a_pool_that_holds_it() {
 fn boxes_do_not_overlap_and_pools_name_a_triangle_once() {
     let tree = tree_of(&shapes::soup(3000, 1));
     let (pools, bounds) = (tree.pools().expect("they are made"), tree.bounds());
-    let mut number = numbers();
+    let mut number = uniform(0.0, 1.0);
     let mut met = 0;
     for _ in 0..5000 {
         let part = Vec3::new(number(), number(), number());

@@ -102,6 +102,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Aabb, Ray};
     use crate::simd::{Chosen, Isa, Simd, Task};
+    use crate::weyl::uniform;
     use glam::Vec3;
 
     /// A ray's ways out of a node, the next one last, and where it enters the boxes.
@@ -147,18 +148,9 @@ mod tests {
         node
     }
 
-    /// Numbers between -1 and 1.
-    fn numbers() -> impl FnMut() -> f32 {
-        let mut state = 0.0f64;
-        move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 2.0 - 1.0) as f32
-        }
-    }
-
     #[test]
     fn a_ray_enters_each_box_that_it_touches_the_nearest_last_and_few_others() {
-        let mut number = numbers();
+        let mut number = uniform(-1.0, 1.0);
         let (mut entered, mut touched) = (0, 0);
         for isa in Isa::available() {
             let chosen = Chosen::new(isa).expect("it is available");

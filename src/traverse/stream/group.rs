@@ -246,6 +246,7 @@ mod tests {
     use crate::mesh::Mesh;
     use crate::simd::{Isa, Simd, Task};
     use crate::traverse::{Accel, Kernel};
+    use crate::weyl::uniform;
     use glam::Vec3;
 
     /// Hills of some two thousand triangles.
@@ -267,11 +268,7 @@ mod tests {
 
     /// Eights of rays that start near one another above, on and below the hills, and go everywhere; some of them end soon.
     fn eights() -> Vec<Ray> {
-        let mut state = 0.0f64;
-        let mut number = move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 2.0 - 1.0) as f32
-        };
+        let mut number = uniform(-1.0, 1.0);
         let mut point = move || Vec3::new(number(), number(), number());
         let mut eight = |i: usize| {
             let place = (point() * Vec3::new(0.5, 0.5, 0.06)) + Vec3::new(0.5, 0.5, 0.0);

@@ -132,18 +132,10 @@ impl Expansion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::weyl::uniform;
 
     fn point(x: f32, y: f32, z: f32) -> DVec3 {
         DVec3::new(x.into(), y.into(), z.into())
-    }
-
-    /// Uniform in -4..4.
-    fn numbers() -> impl FnMut() -> f32 {
-        let mut state = 0.0f64;
-        move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 8.0 - 4.0) as f32
-        }
     }
 
     #[test]
@@ -167,7 +159,7 @@ mod tests {
     #[test]
     fn nothing_is_left_of_a_ray_in_the_plane() {
         // The products are multiplied out about the coordinates' origin, so they have to cancel.
-        let mut number = numbers();
+        let mut number = uniform(-4.0, 4.0);
         for _ in 0..20_000 {
             let y = number();
             let mut p = |y| point(number(), y, number());
@@ -181,7 +173,7 @@ mod tests {
 
     #[test]
     fn the_exact_forms_agree_with_the_quick_ones() {
-        let mut number = numbers();
+        let mut number = uniform(-4.0, 4.0);
         for _ in 0..1000 {
             let mut p = || point(number(), number(), number());
             let (a, b, c, o) = (p(), p(), p(), p());

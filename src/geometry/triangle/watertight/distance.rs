@@ -168,6 +168,7 @@ mod tests {
     use super::super::edge_functions;
     use super::*;
     use crate::geometry::triangle::Test;
+    use crate::weyl::uniform;
     use glam::Vec3;
 
     /// A ray, at its end: whether nothing is to be clipped by [`is_well_inside`], and `t` before and after clipping.
@@ -183,11 +184,7 @@ mod tests {
 
     #[test]
     fn what_passes_well_inside_is_not_clipped() {
-        let mut state = 0.0f64;
-        let mut number = move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 2.0 - 1.0) as f32
-        };
+        let mut number = uniform(-1.0, 1.0);
         let mut point = || Vec3::new(number(), number(), number());
         let (mut well, mut moved) = (0, 0);
         for i in 0..300_000 {

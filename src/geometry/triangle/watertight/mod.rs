@@ -294,6 +294,7 @@ fn to_f32_with_sign(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::weyl::uniform;
     use glam::Vec3;
 
     /// One ray against one triangle: its `t`, or `None`.
@@ -303,18 +304,9 @@ mod tests {
         found.inside.then_some(found.t)
     }
 
-    /// Uniform in -1..1 (a Weyl sequence is random enough here).
-    fn numbers() -> impl FnMut() -> f32 {
-        let mut state = 0.0f64;
-        move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 2.0 - 1.0) as f32
-        }
-    }
-
     #[test]
     fn nothing_passes_between_triangles_that_share_an_edge() {
-        let mut number = numbers();
+        let mut number = uniform(-1.0, 1.0);
         let mut point = || Vec3::new(number(), number(), number());
         for _ in 0..200_000 {
             // A quadrilateral that opens toward the ray's origin, and a ray at its diagonal.
@@ -331,7 +323,7 @@ mod tests {
     fn t_is_right_on_a_huge_floor() {
         let floor =
             [Vec3::new(-450.0, -0.1, -450.0), Vec3::new(450.0, -0.1, 500.0), Vec3::new(470.0, -0.1, -450.0)];
-        let mut number = numbers();
+        let mut number = uniform(-1.0, 1.0);
         for _ in 0..10_000 {
             let origin = Vec3::new(100.0 + 90.0 * number(), 0.05 * number(), -300.0 + 90.0 * number());
             let direction = Vec3::new(number(), -0.2 - number().abs(), number());
@@ -343,7 +335,7 @@ mod tests {
 
     #[test]
     fn t_lies_between_the_corners_depths_for_slivers_too() {
-        let mut number = numbers();
+        let mut number = uniform(-1.0, 1.0);
         let mut hits = 0;
         for _ in 0..50_000 {
             let (p, q) = (Vec3::new(number(), number(), number()), Vec3::new(number(), number(), number()));

@@ -142,6 +142,7 @@ mod tests {
     use crate::geometry::triangle::exact::Filter;
     use crate::geometry::triangle::{Candidate, Corners, Triangle};
     use crate::simd::{Chosen, Isa, Lanes, Mask, Simd, Task};
+    use crate::weyl::uniform;
     use proptest::prelude::*;
 
     struct Ask<'a, const SIGNS: bool>(&'a Pooled, &'a Sixteens<'a>, [f32; 2]);
@@ -207,18 +208,9 @@ mod tests {
         counts
     }
 
-    /// Numbers between -1 and 1.
-    fn numbers() -> impl FnMut() -> f32 {
-        let mut state = 0.0f64;
-        move || {
-            state = (state + 0.618_033_988_749_895).fract();
-            (state * 2.0 - 1.0) as f32
-        }
-    }
-
     #[test]
     fn hits_are_never_out_of_bounds_and_mostly_certain() {
-        let mut number = numbers();
+        let mut number = uniform(-1.0, 1.0);
         let mut counts = [0; 2];
         for round in 0..4000 {
             // Of many sizes and shapes, far away or near, met squarely or grazed, inside or near an edge.
