@@ -1,6 +1,6 @@
 //! Which rays of a tile are one beam: those that do not belong leave it to the others, packet by packet and lane by lane.
 
-use crate::meshes::of_triangles;
+use crate::meshes::{joined, of_triangles};
 use raypack::Vec3;
 use raypack::geometry::Ray;
 use raypack::kdtree::BuildParams;
@@ -103,6 +103,51 @@ fn packets_that_do_not_belong_to_a_beam_leave_it_to_the_others() {
             if strange <= 4 {
                 assert_eq!(beams, 1, "{strange} on {isa}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_ray_that_does_not_belong_hides_nothing_from_its_packet() {
+    // A low ceiling over the first half of each packet, and a high one over all.
+    let [low, high] = [1.0f32, 2.0].map(|height| {
+        of_triangles((0..400).map(|i| {
+            let corner = Vec3::new((i % 20) as f32 - 10.0, 10.0, (i / 20) as f32 - 10.0) * 0.1;
+            [corner, corner + Vec3::X * 0.2, corner + Vec3::Z * 0.2].map(|p| p * height)
+        }))
+    });
+    let eye = Vec3::new(0.1, 0.2, 0.3);
+    let half = of_triangles(
+        low.triangles.iter().map(|t| t.map(|i| low.positions[i as usize])).filter(|t| t[0].z < eye.z - 0.05),
+    );
+    let first_of_high = half.triangles.len() as u32;
+    let mesh = joined(&[half, high]);
+    // Along another axis altogether, and no rays at all.
+    let strangers = [Vec3::X, Vec3::ZERO, Vec3::NAN, Vec3::new(1.0, f32::INFINITY, 0.0)];
+    for isa in Isa::available() {
+        let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds").with_isa(isa);
+        for (stranger, place) in strangers.iter().flat_map(|stranger| (0..16).map(move |i| (stranger, i))) {
+            let rays: Vec<Ray> = (0..256)
+                .map(|i: usize| {
+                    let slope = Vec3::new((i / 16) as f32 * 0.02 - 0.15, 1.0, (i % 16) as f32 * 0.1 - 0.75);
+                    Ray::new(eye, if i % 16 == place { *stranger } else { slope })
+                })
+                .collect();
+            let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+            let TogetherAndAlone { beams, hits: [together, alone], occluded } =
+                together_and_alone(&accel, &packets);
+            let mut ceilings = [0, 0];
+            for (packet, lane) in (0..16).flat_map(|packet| (0..16).map(move |lane| (packet, lane))) {
+                let [together, alone] = [&together, &alone].map(|hits| hits[packet].get(lane));
+                assert_eq!(together, alone, "{stranger} at {place} on {isa}: packet {packet}, lane {lane}");
+                if together.is_hit() {
+                    ceilings[usize::from(together.primitive >= first_of_high)] += 1;
+                }
+            }
+            assert_eq!(occluded[0], occluded[1], "{stranger} at {place} on {isa}");
+            assert!(ceilings.iter().all(|&hits| hits >= 16), "{ceilings:?}");
+            // The first lane tells where a beam goes; and what runs along its axis, infinitely fast, seems to belong.
+            assert!(beams > 0 || place == 0 || stranger.y.is_infinite(), "{stranger} at {place} on {isa}");
         }
     }
 }

@@ -126,14 +126,17 @@ where
         }
     }
 
-    /// Draws a packet's reach in to what its rays still look for.
+    /// Draws a packet's reach in to what its rays still look for: those that count. What the others' speed is may be 0 or
+    /// no number, and no number is the greatest of any.
     #[inline(always)]
     fn shorten(&mut self, square: usize, packet: usize) {
         let mut reach = f32::NEG_INFINITY;
         let rays = &self.rays[square * PACKETS + packet];
         for part in 0..P {
             let speed = load_part::<N, R>(&rays.direction[self.beam.frame.axes[2]], part).abs();
-            let depth = (self.closest[square][packet][part].t * speed).greatest();
+            let depths = self.closest[square][packet][part].t * speed;
+            let counts = self.counts(square, packet, part);
+            let depth = R::select(counts, depths, R::splat(f32::NEG_INFINITY)).greatest();
             reach = if depth > reach { depth } else { reach };
         }
         let reach = L::splat(reach + reach.abs() * ROUNDINGS);
