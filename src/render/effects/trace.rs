@@ -17,9 +17,11 @@ pub struct Tracer {
     /// What was learnt about rays that may have much in common.
     ways: [Dispatch; Way::ALL.len()],
     /// The same of rays to lights.
-    lights: [Dispatch; 3],
+    lights: [Dispatch; 2],
     /// What was learnt about rays that go everywhere: from surfaces, and to all that surrounds the scene.
     scattered: ScatteredDispatch,
+    /// The same of rays that look no farther than for what dims a surface.
+    near: ScatteredDispatch,
     packets: Packets,
     found: Vec<bool>,
     sifted: Vec<Ray>,
@@ -110,12 +112,10 @@ impl Tracer {
             accel.occluded_many(kernel, rays, &mut self.found);
         } else if effect == Effect::Environment {
             self.scattered.occluded(accel, rays, &mut self.found);
+        } else if effect == Effect::AmbientOcclusion {
+            self.near.occluded(accel, rays, &mut self.found);
         } else {
-            let dispatch = match effect {
-                Effect::Shadows => &mut self.lights[0],
-                Effect::SoftShadows => &mut self.lights[1],
-                _ => &mut self.lights[2],
-            };
+            let dispatch = &mut self.lights[usize::from(effect == Effect::SoftShadows)];
             for (rays, found) in rays.chunks(LOT).zip(self.found.chunks_mut(LOT)) {
                 let packets = &mut self.packets;
                 let count = packets.fill(accel, rays);

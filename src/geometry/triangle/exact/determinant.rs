@@ -2,9 +2,11 @@
 //!
 //! Each is computed in double precision with a bound of its error (in the manner of Shewchuk,
 //! "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997).
-//! Where the error could reach the thirtieth bit, the determinant is multiplied out: as long as all
-//! numbers are floats, a product of two of them is exact in double precision, and the sum of the
-//! products with a third is computed exactly, as an expansion.
+//! Where the error could reach the thirtieth bit, it is computed without any, in one of two ways. Floats of about one
+//! magnitude are multiples of one unit by numbers of not many bits, and so integers do. Otherwise the
+//! determinant is multiplied out: as long as all numbers are floats, a product of two of them is exact in double
+//! precision, and the sum of the products with a third is computed exactly, as an expansion, which takes some
+//! ten times as long.
 //!
 //! **Range.** Products of three floats lie between 2^-447 and 2^384: nothing here can overflow or
 //! underflow.
@@ -71,6 +73,75 @@ fn triple(a: DVec3, b: DVec3, c: DVec3) -> (f64, f64) {
 #[cold]
 #[inline(never)]
 fn exact_volume(d: DVec3, p: DVec3, q: DVec3, o: DVec3) -> Certain {
+    let whole = || {
+        let (along, places) = (Units::of(&[d]), Units::of(&[p, q, o]));
+        let [d, p, q, o] = [along.whole(d)?, places.whole(p)?, places.whole(q)?, places.whole(o)?];
+        Some(whole_triple(d, less(p, o), less(q, o)) as f64 * (along.unit * places.unit * places.unit))
+    };
+    whole().map_or_else(|| expanded_volume(d, p, q, o), Certain)
+}
+
+#[cold]
+#[inline(never)]
+fn exact_along_normal(p0: DVec3, p1: DVec3, p2: DVec3, o: DVec3) -> Certain {
+    let whole = || {
+        let places = Units::of(&[p0, p1, p2, o]);
+        let [p0, p1, p2, o] = [places.whole(p0)?, places.whole(p1)?, places.whole(p2)?, places.whole(o)?];
+        let volume = whole_triple(less(p0, o), less(p1, p0), less(p2, p0));
+        Some(volume as f64 * (places.unit * places.unit * places.unit))
+    };
+    whole().map_or_else(|| expanded_along_normal(p0, p1, p2, o), Certain)
+}
+
+/// Floats as multiples of a power of two by whole numbers of less than `2^BITS`.
+struct Units {
+    unit: f64,
+    per_unit: f64,
+}
+
+/// The sum of three products of differences of such numbers is less than `3 * 2 * 2^(3 * 41)`: it has a place in 128 bits.
+const BITS: u64 = 40;
+
+impl Units {
+    /// The least unit that the greatest coordinate does with.
+    #[inline]
+    fn of(vectors: &[DVec3]) -> Self {
+        let least = f64::from(f32::from_bits(1));
+        let greatest = vectors.iter().fold(least, |greatest, v| greatest.max(v.abs().max_element()));
+        // A number of 2^e and more, and less than twice that, where e has a bias of 1023.
+        let exponent = greatest.to_bits() >> 52;
+        let power = |exponent: u64| f64::from_bits(exponent << 52);
+        Self { unit: power(exponent + 1 - BITS), per_unit: power(2 * 1023 + BITS - 1 - exponent) }
+    }
+
+    /// A vector in units, if it is a multiple of them.
+    #[inline]
+    fn whole(&self, v: DVec3) -> Option<[i64; 3]> {
+        let scaled = v * self.per_unit;
+        let whole = scaled.as_i64vec3();
+        (whole.as_dvec3() == scaled).then_some(whole.to_array())
+    }
+}
+
+#[inline]
+fn less(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `a . (b x c)`.
+#[inline]
+fn whole_triple(a: [i64; 3], b: [i64; 3], c: [i64; 3]) -> i128 {
+    let product = |x: i64, y: i64| i128::from(x) * i128::from(y);
+    let term = |axis: usize| {
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        i128::from(a[axis]) * (product(b[j], c[k]) - product(b[k], c[j]))
+    };
+    term(0) + term(1) + term(2)
+}
+
+#[cold]
+#[inline(never)]
+fn expanded_volume(d: DVec3, p: DVec3, q: DVec3, o: DVec3) -> Certain {
     let mut sum = Expansion::new();
     sum.add_triple(d, p, q);
     sum.add_triple(d, o, p);
@@ -80,7 +151,7 @@ fn exact_volume(d: DVec3, p: DVec3, q: DVec3, o: DVec3) -> Certain {
 
 #[cold]
 #[inline(never)]
-fn exact_along_normal(p0: DVec3, p1: DVec3, p2: DVec3, o: DVec3) -> Certain {
+fn expanded_along_normal(p0: DVec3, p1: DVec3, p2: DVec3, o: DVec3) -> Certain {
     let mut sum = Expansion::new();
     sum.add_triple(p0, p1, p2);
     sum.add_triple(-o, p1, p2);
@@ -178,11 +249,51 @@ mod tests {
             let mut p = || point(number(), number(), number());
             let (a, b, c, o) = (p(), p(), p(), p());
             let exact = [exact_volume(a, b, c, o), exact_along_normal(a, b, c, o)].map(Certain::value);
+            let expanded =
+                [expanded_volume(a, b, c, o), expanded_along_normal(a, b, c, o)].map(Certain::value);
             let quick = [triple(a, b - o, c - b).0, triple(a - o, b - a, c - a).0];
-            for (exact, quick) in exact.into_iter().zip(quick) {
+            for ((exact, expanded), quick) in exact.into_iter().zip(expanded).zip(quick) {
                 assert!((exact - quick).abs() < 1e-12, "{exact} {quick}");
+                // Sums of components are rounded once or twice.
+                assert!((exact - expanded).abs() <= 1e-15 * expanded.abs(), "{exact} {expanded}");
             }
         }
+    }
+
+    #[test]
+    fn integers_answer_as_expansions_do_or_not_at_all() {
+        let mut number = uniform(-1.0, 1.0);
+        let mut answered = [0, 0];
+        for round in 0..40_000 {
+            // From coordinates that share few bits to such that share all; points near one plane, and in it.
+            let spread = (round % 8) * 6;
+            let mut coordinate = |flat: bool| {
+                let scale = 2f32.powi((number() * spread as f32) as i32);
+                if flat { 0.3 } else { number() * scale }
+            };
+            let mut p = || point(coordinate(false), coordinate(round % 3 == 0), coordinate(false));
+            let (d, a, b, c, o) = (p(), p(), p(), p(), p());
+            for (exact, expanded) in [
+                (exact_volume(d, a, b, o), expanded_volume(d, a, b, o)),
+                (exact_along_normal(a, b, c, o), expanded_along_normal(a, b, c, o)),
+                // A ray along an edge, and a triangle without area.
+                (exact_volume(b - a, a, b, a), expanded_volume(b - a, a, b, a)),
+                (exact_along_normal(a, b, b, o), expanded_along_normal(a, b, b, o)),
+            ] {
+                assert_eq!(exact.sign(), expanded.sign());
+                let (exact, expanded) = (exact.value(), expanded.value());
+                assert!((exact - expanded).abs() <= 1e-15 * expanded.abs(), "{exact} {expanded}");
+            }
+            answered[usize::from(Units::of(&[a, b, o]).whole(a).is_some())] += 1;
+        }
+        assert!(answered.iter().all(|&count| count > 1000), "{answered:?}");
+        // The greatest that there are.
+        let high = f64::from((1u32 << 24) - 1) * f64::from(1 << 16);
+        let corners = [(1.0, -1.0, 1.0), (1.0, 1.0, -1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0)];
+        let [a, b, c, o] = corners.map(|(x, y, z)| DVec3::new(x, y, z) * high);
+        assert!(Units::of(&[a]).whole(a).is_some_and(|a| a[0] < 1 << BITS && a[0] >= 1 << (BITS - 1)));
+        let exact = [exact_volume(a - o, b, c, o), exact_along_normal(a, b, c, o)].map(Certain::value);
+        assert_eq!(exact, [16.0 * high.powi(3); 2]);
     }
 
     #[test]
