@@ -76,7 +76,7 @@ fn exact_volume(d: DVec3, p: DVec3, q: DVec3, o: DVec3) -> Certain {
     let whole = || {
         let (along, places) = (Units::of(&[d]), Units::of(&[p, q, o]));
         let [d, p, q, o] = [along.whole(d)?, places.whole(p)?, places.whole(q)?, places.whole(o)?];
-        Some(whole_triple(d, less(p, o), less(q, o)) as f64 * (along.unit * places.unit * places.unit))
+        Some(whole_triple(d, less(p, o), less(q, o)) * (along.unit * places.unit * places.unit))
     };
     whole().map_or_else(|| expanded_volume(d, p, q, o), Certain)
 }
@@ -88,7 +88,7 @@ fn exact_along_normal(p0: DVec3, p1: DVec3, p2: DVec3, o: DVec3) -> Certain {
         let places = Units::of(&[p0, p1, p2, o]);
         let [p0, p1, p2, o] = [places.whole(p0)?, places.whole(p1)?, places.whole(p2)?, places.whole(o)?];
         let volume = whole_triple(less(p0, o), less(p1, p0), less(p2, p0));
-        Some(volume as f64 * (places.unit * places.unit * places.unit))
+        Some(volume * (places.unit * places.unit * places.unit))
     };
     whole().map_or_else(|| expanded_along_normal(p0, p1, p2, o), Certain)
 }
@@ -99,8 +99,8 @@ struct Units {
     per_unit: f64,
 }
 
-/// The sum of three products of differences of such numbers is less than `3 * 2 * 2^(3 * 41)`: it has a place in 128 bits.
-const BITS: u64 = 40;
+/// Differences of such numbers and products of two differences have places in 64 and 128 bits.
+const BITS: u64 = 60;
 
 impl Units {
     /// The least unit that the greatest coordinate does with.
@@ -128,15 +128,29 @@ fn less(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// `a . (b x c)`.
+/// `a . (b x c)` of numbers of up to 61 bits, computed in 192 bits and then rounded.
 #[inline]
-fn whole_triple(a: [i64; 3], b: [i64; 3], c: [i64; 3]) -> i128 {
+fn whole_triple(a: [i64; 3], b: [i64; 3], c: [i64; 3]) -> f64 {
     let product = |x: i64, y: i64| i128::from(x) * i128::from(y);
-    let term = |axis: usize| {
+    // `2^64 high + low`.
+    let (mut high, mut low) = (0, 0);
+    for axis in 0..3 {
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
-        i128::from(a[axis]) * (product(b[j], c[k]) - product(b[k], c[j]))
-    };
-    term(0) + term(1) + term(2)
+        let area = product(b[j], c[k]) - product(b[k], c[j]);
+        high += product(a[axis], (area >> 64) as i64);
+        low += i128::from(a[axis]) * i128::from(area as u64);
+    }
+    // What is carried, and no halves of different signs: they would cancel.
+    high += low >> 64;
+    let mut low = low as u64;
+    let is_negative = high < 0;
+    if is_negative {
+        high = !high + i128::from(low == 0);
+        low = low.wrapping_neg();
+    }
+    const HALF: f64 = (1u128 << 64) as f64;
+    let magnitude = high as f64 * HALF + low as f64;
+    if is_negative { -magnitude } else { magnitude }
 }
 
 #[cold]
@@ -266,7 +280,7 @@ mod tests {
         let mut answered = [0, 0];
         for round in 0..40_000 {
             // From coordinates that share few bits to such that share all; points near one plane, and in it.
-            let spread = (round % 8) * 6;
+            let spread = (round % 8) * 9;
             let mut coordinate = |flat: bool| {
                 let scale = 2f32.powi((number() * spread as f32) as i32);
                 if flat { 0.3 } else { number() * scale }
@@ -287,8 +301,10 @@ mod tests {
             answered[usize::from(Units::of(&[a, b, o]).whole(a).is_some())] += 1;
         }
         assert!(answered.iter().all(|&count| count > 1000), "{answered:?}");
-        // The greatest that there are.
-        let high = f64::from((1u32 << 24) - 1) * f64::from(1 << 16);
+        // The least that there are, and the greatest.
+        let unit = |axis: usize, length: i64| std::array::from_fn(|i| if i == axis { length } else { 0 });
+        assert_eq!([1, -1].map(|z| whole_triple(unit(0, 1), unit(1, 1), unit(2, z))), [1.0, -1.0]);
+        let high = f64::from((1u32 << 24) - 1) * 2f64.powi(36);
         let corners = [(1.0, -1.0, 1.0), (1.0, 1.0, -1.0), (-1.0, 1.0, 1.0), (-1.0, -1.0, -1.0)];
         let [a, b, c, o] = corners.map(|(x, y, z)| DVec3::new(x, y, z) * high);
         assert!(Units::of(&[a]).whole(a).is_some_and(|a| a[0] < 1 << BITS && a[0] >= 1 << (BITS - 1)));
