@@ -182,7 +182,7 @@ impl Scene {
 fn kernels_of(tree: usize, accuracy: Accuracy) -> Vec<Kernel> {
     match (tree, accuracy) {
         (POOLED, Accuracy::Fast) => vec![],
-        (POOLED, _) => vec![Kernel::Single, Kernel::Stream],
+        (POOLED, _) => vec![Kernel::Single, Kernel::Stream, Kernel::Filter],
         _ => Kernel::ALL.into(),
     }
 }

@@ -48,6 +48,15 @@ pub struct Boxes {
     pub orders: [u32; 8],
 }
 
+impl Boxes {
+    /// Which box comes at each place, the farthest first, for rays that run into an octant.
+    #[inline(always)]
+    pub fn lanes(&self, octant: usize) -> [usize; 8] {
+        let order = self.orders[octant & 7];
+        [0, 4, 8, 12, 16, 20, 24, 28].map(|shift| (order >> shift & 7) as usize)
+    }
+}
+
 /// The way to what is in a box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Way(pub i32);

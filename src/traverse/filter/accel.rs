@@ -1,9 +1,11 @@
 //! Lists of rays through an [`Accel`].
 
+use super::ground::{OfBoxes, OfLines};
 use super::source::Source;
 use super::{ByEights, trace};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
+use crate::kdtree::Pools;
 use crate::simd::{Eight, Simd};
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
@@ -13,12 +15,12 @@ use crate::traverse::{Accel, RayPacket, closest};
 impl Accel {
     /// The closest hit of each ray, by lists of rays.
     pub(in crate::traverse) fn intersect_filtered(&self, rays: &[Ray], hits: &mut [Hit]) {
-        self.ask_all_in_memory(Filter { rays: Source::Slice(rays), answers: Closest(hits) });
+        self.ask_lists(Source::Slice(rays), Closest(hits));
     }
 
     /// Whether anything lies in each ray's interval, likewise.
     pub(in crate::traverse) fn occluded_filtered(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.ask_all_in_memory(Filter { rays: Source::Slice(rays), answers: Found::Rays(occluded) });
+        self.ask_lists(Source::Slice(rays), Found::Rays(occluded));
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet.
@@ -30,10 +32,15 @@ impl Accel {
     ) {
         assert!(rays.len() == active.len() && rays.len() == occluded.len(), "as many lanes as packets");
         occluded.fill(0);
-        self.ask_all_in_memory(Filter {
-            rays: Source::Packets(rays, active),
-            answers: Found::Lanes(occluded),
-        });
+        self.ask_lists(Source::Packets(rays, active), Found::Lanes(occluded));
+    }
+
+    /// Has lists answered: through boxes and pools if they have been made.
+    fn ask_lists(&self, rays: Source<'_>, answers: impl ByEights) {
+        match self.pools() {
+            Some(pools) => self.ask_closed(InBoxes { pools, rays, answers }),
+            None => self.ask_all_in_memory(Filter { rays, answers }),
+        }
     }
 }
 
@@ -45,7 +52,20 @@ struct Filter<'a, A> {
 impl<A: ByEights> ResidentQuery for Filter<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        trace::<S, M, A>(tree, self.rays, &mut self.answers);
+        trace::<S, M, A>(tree, &OfLines(tree.tree), self.rays, &mut self.answers);
+    }
+}
+
+struct InBoxes<'a, A> {
+    pools: &'a Pools,
+    rays: Source<'a>,
+    answers: A,
+}
+
+impl<A: ByEights> ResidentQuery for InBoxes<'_, A> {
+    #[inline(always)]
+    fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
+        trace::<S, M, A>(tree, &OfBoxes(self.pools), self.rays, &mut self.answers);
     }
 }
 

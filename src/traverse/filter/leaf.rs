@@ -4,43 +4,38 @@ use super::cut::present;
 use super::lists::{Entries, List};
 use super::lot::Lot;
 use crate::geometry::triangle::{Mode, Test};
-use crate::kdtree::Exit;
 use crate::simd::{Dense, Mask, prefetch_both};
 use crate::traverse::records::Resident;
 
 /// Triangles that are sifted before some are tested.
-const SIFTED: usize = 16;
+pub const SIFTED: usize = 16;
 
-/// The triangles of the leaf that a list is in.
+/// Fetches the triangles of a leaf.
 #[inline(always)]
-fn primitives<'a, R>(resident: &Resident<'a, R>, list: &List) -> &'a [u32] {
-    let words = &resident.tree.references()[Exit(list.exit).record()..];
-    &words[1..][..words[0] as usize]
-}
-
-/// Fetches them.
-#[inline(always)]
-pub fn fetch<R>(resident: &Resident<'_, R>, list: &List) {
-    for &primitive in primitives(resident, list) {
-        prefetch_both(resident.records.as_ptr().wrapping_add(primitive as usize));
+pub fn fetch<'a, R>(resident: &Resident<'_, R>, leaf: impl Iterator<Item = &'a [u32]>) {
+    for primitives in leaf {
+        for &primitive in primitives {
+            prefetch_both(resident.records.as_ptr().wrapping_add(primitive as usize));
+        }
     }
 }
 
-/// Tests a leaf's triangles against the rays of a list. With `ANY`, a ray is done at its first hit.
+/// Tests a leaf's triangles, up to [`SIFTED`] at a time, against the rays of a list. With `ANY`, a ray is done at its
+/// first hit.
 #[inline(always)]
-pub fn test<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
+pub fn test<'a, const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
     resident: &Resident<'_, M::Record>,
     lot: &mut Lot,
     entries: &Entries,
     list: &List,
+    leaf: impl Iterator<Item = &'a [u32]> + Clone,
 ) {
-    let primitives = primitives(resident, list);
     let (at, len) = (list.at as usize, list.len as usize);
     let mut done = 0;
     while done < len {
-        let (ids, tmin, tmax) = entries.load::<W, L>(at + done);
+        let (ids, tmin) = entries.starts::<W, L>(at + done);
         let (mut closest, origin) = lot.found::<W, L>(&ids);
-        let live = tmin.le(closest.t.min(tmax)).bits() & present((len - done).min(W));
+        let live = tmin.le(closest.t).bits() & present((len - done).min(W));
         done += W;
         if live == 0 {
             continue;
@@ -49,7 +44,7 @@ pub fn test<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
         let test = M::Test::<W, L>::new(&origin, &[x, y, z], live);
         let lanes = L::mask_from_bits(live);
         let mut changed = false;
-        for primitives in primitives.chunks(SIFTED) {
+        for primitives in leaf.clone() {
             // Which triangles a ray may hit, without a branch on it.
             let mut left = 0;
             for (i, &primitive) in primitives.iter().enumerate() {

@@ -1,12 +1,10 @@
 //! The stack of lists: rays that wait at places of the tree, with their intervals there.
 
 use super::lot::{LOT, Lot};
-use crate::kdtree::{Exit, KdTree};
-use crate::simd::{Dense, Eight, prefetch};
-use std::hint::select_unpredictable;
+use crate::simd::{Dense, Eight};
 
-/// Lines on a way from the root to a leaf.
-const LEVELS: usize = crate::kdtree::MAX_DEPTH.div_ceil(3);
+/// Lines, or nodes of boxes, on a way from the root to a leaf. (A line is three levels, a node of boxes can be one.)
+const LEVELS: usize = crate::kdtree::MAX_DEPTH;
 
 /// Lists that can wait: of the eight exits of each line on a way all but one do; and room for the one that is written in vain.
 pub const DEPTH: usize = (LEVELS * 7 + 2).next_power_of_two();
@@ -26,7 +24,7 @@ const ENTRIES: usize = (room(LOT) + 7 * room(0)).next_power_of_two();
 /// Rays at a place of the tree.
 #[derive(Clone, Copy)]
 pub struct List {
-    /// The place: an exit of a line.
+    /// The place: an exit of a line, or a way out of a node of boxes.
     pub exit: i32,
     /// Where the list's first entry is, and how many there are.
     pub at: u32,
@@ -70,13 +68,10 @@ impl Heads {
         self.count += 1;
     }
 
-    /// Fetches what the list on top will need. (If there is none, something else.)
+    /// Where the list on top is. (If there is none, some place that a list was at.)
     #[inline(always)]
-    pub fn fetch(&self, tree: &KdTree) {
-        let exit = Exit(self.exits[self.count.wrapping_sub(1) % DEPTH]);
-        let line = tree.lines().as_ptr().wrapping_add(exit.line()).cast::<u32>();
-        let record = tree.references().as_ptr().wrapping_add(exit.record());
-        prefetch(select_unpredictable(exit.is_leaf(), record, line));
+    pub fn top(&self) -> i32 {
+        self.exits[self.count.wrapping_sub(1) % DEPTH]
     }
 
     /// Puts lists of one ray each on top, one behind the other from `at` on: a list for each lane whose bit is set.
@@ -131,6 +126,14 @@ impl Entries {
         (ids, tmin, tmax)
     }
 
+    /// Some rays' numbers, and where their intervals begin.
+    #[inline(always)]
+    pub fn starts<const W: usize, L: Dense<W>>(&self, at: usize) -> ([i32; W], L) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        let ids = *self.ids[at..].first_chunk().expect(room);
+        (ids, L::load(self.tmin[at..].first_chunk().expect(room)))
+    }
+
     /// One ray's number, and its interval.
     #[inline(always)]
     pub fn one(&self, at: usize) -> (i32, f32, f32) {
@@ -161,5 +164,21 @@ impl Entries {
         L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
         tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
         tmax.close_up(bits, self.tmax[at..].first_chunk_mut().expect(room));
+    }
+
+    /// Writes those of some rays whose bits are set one behind the other, without the ends of their intervals.
+    #[inline(always)]
+    pub fn write_starts<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids, tmin: L) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
+        tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
+    }
+
+    /// The same of one ray, which begins at several places.
+    #[inline(always)]
+    pub fn write_starts_of<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L) {
+        let (at, room) = (at % ENTRIES, "a register behind each");
+        *self.ids[at..].first_chunk_mut().expect(room) = [id; 8];
+        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
     }
 }

@@ -1,11 +1,13 @@
 //! A lot of rays: where each starts, how it runs, and what it has found.
 
 use super::source::Source;
+use crate::geometry::triangle::pooled::Pooled;
 use crate::geometry::{Aabb, Ray};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Lanes, Mask};
 use crate::traverse::closest::{Closest, NONE};
 use crate::traverse::kernel::Kernel;
+use crate::traverse::pool::step::Slabs;
 use crate::traverse::ready::Ready;
 use crate::traverse::stream::step::Planes;
 use crate::traverse::walk::{MARGIN, load3};
@@ -174,6 +176,41 @@ impl Lot {
         let inverse = L::of_fours([&traveller.inverse; 2]).pick_in_fours(exits);
         let margin = L::splat(self.thickness) * inverse.abs();
         (Planes { exits, origin, inverse, margin }, traveller.start[3])
+    }
+
+    /// A ray as boxes see it, and where it ends.
+    #[inline(always)]
+    pub fn slabs(&self, id: i32) -> (Slabs, f32) {
+        let Traveller { start: [x, y, z, closest], inverse: [by_x, by_y, by_z, _] } =
+            self.travellers[id as usize % LOT];
+        let inverse = [by_x, by_y, by_z];
+        let margin = inverse.map(|inverse| self.thickness * inverse.abs());
+        (Slabs::new(&[x, y, z], &inverse, &margin), closest)
+    }
+
+    /// A ray that ends where a hit must not lie beyond, and the closest triangle's id, or [`NONE`].
+    #[inline(always)]
+    pub fn ray(&self, id: i32) -> (Ray, i32) {
+        let id = id as usize % LOT;
+        let Traveller { start: [x, y, z, closest], inverse: [.., primitive] } = self.travellers[id];
+        let [dx, dy, dz, tnear] = self.ways[id];
+        let ray = Ray { origin: Vec3::new(x, y, z), direction: Vec3::new(dx, dy, dz), tnear, tfar: closest };
+        (ray, primitive.to_bits() as i32)
+    }
+
+    /// A ray of the lot as pools see it.
+    #[inline(always)]
+    pub fn pooled(&self, ray: &Ray) -> Pooled {
+        // How far the scene reaches from any of them.
+        Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), self.thickness / MARGIN)
+    }
+
+    /// Keeps what a ray has found.
+    #[inline(always)]
+    pub fn keep_one(&mut self, id: i32, t: f32, primitive: i32) {
+        let traveller = &mut self.travellers[id as usize % LOT];
+        traveller.start[3] = t;
+        traveller.inverse[3] = f32::from_bits(primitive as u32);
     }
 
     /// What rays have found, and where they start.

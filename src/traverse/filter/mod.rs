@@ -21,10 +21,13 @@
 //! ordinary (`range.rs`) are left to the packet kernel.
 
 mod accel;
+mod boxes;
 mod cut;
+mod ground;
 mod leaf;
 mod lists;
 mod lot;
+mod pool;
 mod source;
 
 use super::closest::{Closest, Normals};
@@ -32,8 +35,9 @@ use super::records::Resident;
 use super::stream::{self, Answers};
 use super::walk::load3;
 use crate::geometry::triangle::{Mode, Test};
-use crate::kdtree::{Exit, Tree};
+use crate::kdtree::Tree;
 use crate::simd::{Eight, Simd};
+use ground::Ground;
 use lists::{Entries, Heads};
 use lot::{LOT, Lot};
 use source::Source;
@@ -82,10 +86,11 @@ thread_local! {
     static ROOM: Cell<Option<Box<Room>>> = const { Cell::new(None) };
 }
 
-/// Traces rays and gives an answer for each.
+/// Traces rays through some ground and gives an answer for each.
 #[inline(always)]
-pub fn trace<S: Simd, M: Mode, A: ByEights>(
+fn trace<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
+    ground: &impl Ground,
     rays: Source<'_>,
     answers: &mut A,
 ) {
@@ -106,9 +111,9 @@ pub fn trace<S: Simd, M: Mode, A: ByEights>(
         } else {
             room.lot.prepare::<S::F8>(rays, eights.clone(), resident.bounds());
             if A::ANY {
-                walk::<S, M, true>(resident, room);
+                walk::<S, M, true>(resident, ground, room);
             } else {
-                walk::<S, M, false>(resident, room);
+                walk::<S, M, false>(resident, ground, room);
             }
         }
         give::<S, M, A>(resident, rays, eights, &room.lot, answers);
@@ -120,9 +125,12 @@ pub fn trace<S: Simd, M: Mode, A: ByEights>(
 ///
 /// Octants take turns, a list each, so that what a list needs of memory can be fetched while the others have theirs.
 #[inline(always)]
-fn walk<S: Simd, M: Mode, const ANY: bool>(resident: &Resident<'_, M::Record>, room: &mut Room) {
+fn walk<S: Simd, M: Mode, const ANY: bool>(
+    resident: &Resident<'_, M::Record>,
+    ground: &impl Ground,
+    room: &mut Room,
+) {
     let Room { lot, entries, heads } = room;
-    let tree = resident.tree;
     let (mut waiting, mut fetched) = (0u32, 0u32);
     let mut at = 0;
     for octant in 0..8 {
@@ -141,30 +149,16 @@ fn walk<S: Simd, M: Mode, const ANY: bool>(resident: &Resident<'_, M::Record>, r
                 waiting &= !(1 << octant);
                 continue;
             };
-            // Sixteen lanes for lists that fill more than half of them.
-            let wide = S::NATIVE == 16 && list.len > 8;
-            let exit = Exit(list.exit);
-            if !exit.is_leaf() {
-                let line = &tree.lines()[exit.line()];
-                if list.len == 1 {
-                    cut::take_one::<S::F8>(line, lot, entries, heads, &list);
-                } else if wide {
-                    cut::cut::<16, S::F16, S::F8>(line, octant, lot, entries, heads, &list);
-                } else {
-                    cut::cut::<8, S::F8, S::F8>(line, octant, lot, entries, heads, &list);
-                }
-                heads.fetch(tree);
+            if !ground.is_leaf(list.exit) {
+                ground.cut::<S>(octant, lot, entries, heads, &list);
+                ground.fetch(heads.top());
             } else if fetched >> octant & 1 == 0 {
-                leaf::fetch(resident, &list);
+                ground.fetch_leaf(resident, &list);
                 heads.keep();
                 fetched |= 1 << octant;
             } else {
-                if wide {
-                    leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, &list);
-                } else {
-                    leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, &list);
-                }
-                heads.fetch(tree);
+                ground.test::<S, M, ANY>(resident, lot, entries, &list);
+                ground.fetch(heads.top());
                 fetched &= !(1 << octant);
             }
         }

@@ -1,5 +1,6 @@
 //! What lists of rays are to be, and that none is lost.
 
+use super::boxes;
 use super::cut::{cut, take_one};
 use super::lists::{Entries, Heads, List};
 use super::lot::{LOT, Lot};
@@ -10,6 +11,7 @@ use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, Task};
 use crate::traverse::{Accel, Kernel, RayPacket};
 use glam::Vec3;
+use std::collections::HashSet;
 
 /// Numbers between -1 and 1 that look like chance.
 struct Numbers(f64);
@@ -85,6 +87,51 @@ impl Task for Cuts<'_> {
     }
 }
 
+/// What waits after lists of some lengths met the first nodes of boxes, by eights and by sixteens; and after each ray alone did.
+struct Meets<'a>(&'a Accel, &'a [Ray]);
+
+impl Task for Meets<'_> {
+    type Output = Vec<[Waiting; 3]>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let (tree, rays) = (self.0.tree(), self.1);
+        let nodes = tree.pools().expect("they were made").nodes();
+        let mut lot = Box::new(Lot::new());
+        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), tree.bounds());
+        let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
+        for octant in 0..8 {
+            let ids = lot.octant(octant);
+            for (i, node) in nodes.iter().take(40).enumerate() {
+                let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
+                let begin = |entries: &mut Entries| {
+                    entries.begin(&ids[..len], &lot, 0);
+                    List { exit: 0, at: 0, len: len as u32 }
+                };
+                let list = begin(&mut entries);
+                boxes::cut::<8, S::F8>(node, octant, &lot, &mut entries, &mut heads, &list);
+                let by_eights = all(&entries, &mut heads);
+                let list = begin(&mut entries);
+                boxes::cut::<16, S::F16>(node, octant, &lot, &mut entries, &mut heads, &list);
+                let by_sixteens = all(&entries, &mut heads);
+                let mut alone = Vec::new();
+                for ray in 0..len {
+                    entries.begin(&ids[ray..=ray], &lot, 0);
+                    boxes::take_one::<S::F8>(node, &lot, &mut entries, &mut heads, 0);
+                    alone.extend(all(&entries, &mut heads));
+                }
+                found.push([by_eights, by_sixteens, alone].map(|mut all| {
+                    // Where intervals end is not kept.
+                    all.iter_mut().for_each(|(.., [_, tmax])| *tmax = 0);
+                    all.sort_unstable();
+                    all
+                }));
+            }
+        }
+        found
+    }
+}
+
 /// Takes all lists off the stack, entry by entry.
 fn all(entries: &Entries, heads: &mut Heads) -> Waiting {
     let mut all = Vec::new();
@@ -114,12 +161,48 @@ fn a_list_is_cut_as_each_of_its_rays_is() {
     }
 }
 
+/// A soup's tree, with pools and without.
+fn trees(triangles: usize, seed: u64) -> [Accel; 2] {
+    [false, true].map(|has_pools| {
+        let accel = Accel::build(&shapes::soup(triangles, seed), &BuildParams::default());
+        let accel = accel.expect("a soup has a tree");
+        if has_pools {
+            accel.make_pools().expect("all is in memory");
+        }
+        accel
+    })
+}
+
+#[test]
+fn a_list_meets_boxes_as_each_of_its_rays_does() {
+    let [_, accel] = trees(3000, 1);
+    let rays = rays(2000, true, 0.3);
+    for isa in Isa::available() {
+        let found = Chosen::new(isa).expect("it is available").run(Meets(&accel, &rays));
+        let (mut all, mut other) = (0, 0);
+        for (i, [by_eights, by_sixteens, alone]) in found.into_iter().enumerate() {
+            assert_eq!(by_eights, by_sixteens, "{isa}, node {i}");
+            // By itself, a ray's numbers are rounded otherwise.
+            let places = |waiting: &Waiting| -> HashSet<(i32, i32)> {
+                waiting.iter().map(|&(way, id, _)| (way, id)).collect()
+            };
+            let (together, alone) = (places(&by_eights), places(&alone));
+            all += together.len();
+            other += together.symmetric_difference(&alone).count();
+        }
+        assert!(all > 4000, "{isa}: {all} entries");
+        assert!(other * 1000 < all, "{isa}: {other} of {all} differ");
+    }
+}
+
 #[test]
 fn nothing_is_left_of_an_earlier_lot() {
-    let build = |triangles| {
-        Accel::build(&shapes::soup(triangles, 3), &BuildParams::default()).expect("a soup has a tree")
-    };
-    let (large, small) = (build(3000), build(1));
+    for (large, small) in trees(3000, 3).into_iter().zip(trees(1, 3)) {
+        nothing_is_left_of(&large, &small);
+    }
+}
+
+fn nothing_is_left_of(large: &Accel, small: &Accel) {
     let rays = rays(LOT, true, 0.7);
     let mut hits = vec![Hit::MISS; LOT];
     large.intersect_many(Kernel::Filter, &rays, &mut hits);
@@ -134,7 +217,7 @@ fn nothing_is_left_of_an_earlier_lot() {
 
 #[test]
 fn every_ray_of_every_lot_is_answered_as_alone() {
-    let tree = Accel::build(&shapes::soup(3000, 2), &BuildParams::default()).expect("a soup has a tree");
+    let trees = trees(3000, 2);
     let mut odd = rays(61, true, 0.9);
     for (i, ray) in odd.iter_mut().enumerate() {
         match i % 6 {
@@ -154,7 +237,7 @@ fn every_ray_of_every_lot_is_answered_as_alone() {
         Vec::new(),
         odd,
     ];
-    for rays in &sets {
+    for (rays, tree) in sets.iter().flat_map(|rays| trees.iter().map(move |tree| (rays, tree))) {
         for isa in Isa::available() {
             for accuracy in Accuracy::ALL {
                 let accel = tree.clone().with_isa(isa).with_accuracy(accuracy);
@@ -169,13 +252,13 @@ fn every_ray_of_every_lot_is_answered_as_alone() {
         }
     }
     let mut hits = vec![Hit::MISS; LOT];
-    tree.intersect_many(Kernel::Filter, &sets[1], &mut hits);
+    trees[0].intersect_many(Kernel::Filter, &sets[1], &mut hits);
     assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 100, "there is something to hit");
 }
 
 #[test]
 fn lanes_of_packets_are_answered_as_alone_and_no_others() {
-    let tree = Accel::build(&shapes::soup(3000, 2), &BuildParams::default()).expect("a soup has a tree");
+    let trees = trees(3000, 2);
     let mut rays = rays(LOT + 16 * 7, true, 0.6);
     for ray in rays.iter_mut().step_by(29) {
         ray.direction *= 1e36;
@@ -189,7 +272,7 @@ fn lanes_of_packets_are_answered_as_alone_and_no_others() {
         let nothing = [Vec3::NAN, Vec3::splat(1e30), Vec3::ZERO][i % 3];
         packets[i / 16].set(i % 16, &Ray::new(nothing, Vec3::ONE));
     }
-    for isa in Isa::available() {
+    for (isa, tree) in Isa::available().iter().flat_map(|&isa| trees.iter().map(move |tree| (isa, tree))) {
         for accuracy in Accuracy::ALL {
             let accel = tree.clone().with_isa(isa).with_accuracy(accuracy);
             let mut occluded = vec![!0; packets.len()];

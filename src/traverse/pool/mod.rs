@@ -22,7 +22,7 @@ mod alone;
 mod answers;
 mod flight;
 mod start;
-mod step;
+pub mod step;
 
 use super::records::Resident;
 use super::stream::step::{END, Waiting};

@@ -67,7 +67,32 @@ pub fn step<L: Eight>(
     tnear: f32,
     tfar: f32,
 ) -> (usize, Way) {
-    let Boxes { faces: [x, y, z], ways, orders } = &nodes[way.node()];
+    let node = &nodes[way.node()];
+    let Met { order, nibbles, enters, bits } = meet::<L>(node, ray, tnear, tfar);
+    L::ids_compact(L::ids_pick(L::ids_load(&node.ways), order), bits, eight(&mut waiting.exits, top));
+    enters.compact(bits, eight(&mut waiting.tmin, top));
+    // What is on top now is known before it can be read there.
+    let before = waiting.exits[top - 1];
+    let nearest = node.ways[(nibbles >> (4 * (bits | 1).ilog2()) & 7) as usize];
+    let way = select_unpredictable(bits == 0, before, nearest);
+    (top + bits.count_ones() as usize - 1, Way(way))
+}
+
+/// The boxes of a node that a ray goes into, the farthest first.
+pub struct Met<L: Eight> {
+    /// Which box each lane is, in four bits of a number each, too.
+    pub order: L::Ids,
+    nibbles: u32,
+    /// Where the ray enters it.
+    pub enters: L,
+    /// A bit for each that the ray goes into.
+    pub bits: u32,
+}
+
+/// Has a ray meet a node's boxes between its ends.
+#[inline(always)]
+pub fn meet<L: Eight>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32) -> Met<L> {
+    let Boxes { faces: [x, y, z], orders, .. } = node;
     // Where the ray enters each box, and where it leaves it.
     let octant = ray.octant as usize;
     let [down_x, down_y, down_z] = [octant & 1, octant >> 1 & 1, octant >> 2 & 1];
@@ -86,14 +111,7 @@ pub fn step<L: Eight>(
     let nibbles = orders[octant & 7];
     let order = L::ids_nibbles(nibbles);
     let (enters, leaves) = (enters.pick(order), leaves.pick(order));
-    let bits = enters.le(leaves).bits() & 0xff;
-    L::ids_compact(L::ids_pick(L::ids_load(ways), order), bits, eight(&mut waiting.exits, top));
-    enters.compact(bits, eight(&mut waiting.tmin, top));
-    // What is on top now is known before it can be read there.
-    let before = waiting.exits[top - 1];
-    let nearest = ways[(nibbles >> (4 * (bits | 1).ilog2()) & 7) as usize];
-    let way = select_unpredictable(bits == 0, before, nearest);
-    (top + bits.count_ones() as usize - 1, Way(way))
+    Met { order, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
 }
 
 #[cfg(test)]

@@ -1,0 +1,120 @@
+//! A list at a node of eight boxes.
+//!
+//! All rays of a list run into one octant. So the boxes have one order for all of them, and near faces are on one side. As many
+//! rays at a time as a register holds are put to the boxes one by one, the farthest first, thick faces and all
+//! ([`pool::step`](crate::traverse::pool::step) says how thick), and each box gets the rays that enter it before they leave it.
+//! (A ray by itself meets all eight at once.)
+//!
+//! A box that a ray enters lies in the one that it came from, so an interval begins where the last box was entered; where it
+//! ends is not kept, as nobody asks.
+
+use super::cut::present;
+use super::lists::{Entries, Heads, List, SLACK};
+use super::lot::Lot;
+use crate::kdtree::Boxes;
+use crate::simd::{Dense, Eight, Lanes, Mask};
+use crate::traverse::pool::step::{Met, meet, thick};
+
+/// Rays of a list as boxes see them.
+struct Seen<const W: usize, L: Lanes<W>> {
+    ids: L::Ids,
+    /// Those of which something is left.
+    live: u32,
+    /// 1 / direction.
+    inverse: [L; 3],
+    /// What is added for near faces, and for far ones.
+    near: [L; 3],
+    far: [L; 3],
+    /// Where each begins, and where it ends.
+    tmin: L,
+    closest: L,
+}
+
+impl<const W: usize, L: Dense<W>> Seen<W, L> {
+    /// The rays of up to `W` entries.
+    #[inline(always)]
+    fn new(lot: &Lot, entries: &Entries, at: usize, count: usize) -> Self {
+        let (ids, tmin) = entries.starts::<W, L>(at);
+        let crossing = lot.crossing::<W, L>(&ids);
+        let ([mut near, mut far], closest) = ([[tmin; 3]; 2], crossing.closest);
+        for axis in 0..3 {
+            [near[axis], far[axis]] =
+                thick(crossing.origin[axis], crossing.inverse[axis], crossing.margin[axis]);
+        }
+        let live = tmin.le(closest).bits() & present(count.min(W));
+        Self { ids: L::ids_of(&ids), live, inverse: crossing.inverse, near, far, tmin, closest }
+    }
+
+    /// The rays that go into a box, and where they enter it.
+    #[inline(always)]
+    fn meet(&self, node: &Boxes, octant: usize, lane: usize) -> (u32, L) {
+        let (mut enters, mut leaves) = (self.tmin, self.closest);
+        for axis in 0..3 {
+            let (down, faces) = (octant >> axis & 1, &node.faces[axis]);
+            let first = L::splat(faces[down][lane]).mul_add(self.inverse[axis], self.near[axis]);
+            let last = L::splat(faces[down ^ 1][lane]).mul_add(self.inverse[axis], self.far[axis]);
+            // (`max` and `min` keep a NaN that stands on their right.)
+            (enters, leaves) = (first.max(enters), last.min(leaves));
+        }
+        (enters.le(leaves).bits() & self.live, enters)
+    }
+}
+
+/// Has a list meet a node's boxes, and puts what comes out on the stack, the nearest on top.
+#[inline(always)]
+pub fn cut<const W: usize, L: Dense<W>>(
+    node: &Boxes,
+    octant: usize,
+    lot: &Lot,
+    entries: &mut Entries,
+    heads: &mut Heads,
+    list: &List,
+) {
+    let (at, len) = (list.at as usize, list.len as usize);
+    let lanes: [usize; 8] = node.lanes(octant);
+    if len <= W {
+        // All are in registers, and what comes out takes their place.
+        let seen = Seen::<W, L>::new(lot, entries, at, len);
+        let mut next = at;
+        for lane in lanes {
+            let (bits, enters) = seen.meet(node, octant, lane);
+            let count = bits.count_ones() as usize;
+            entries.write_starts::<W, L>(next, bits, seen.ids, enters);
+            heads.push(node.ways[lane], next, count);
+            next += count;
+        }
+        return;
+    }
+
+    // A place for each box, behind the list.
+    let stride = (len + 2 * SLACK - 1) & !(SLACK - 1);
+    let mut begin = [0; 8];
+    for place in 0..8 {
+        begin[place] = at + (place + 1) * stride;
+    }
+    let mut next = begin;
+    for done in (0..len).step_by(W) {
+        let seen = Seen::<W, L>::new(lot, entries, at + done, len - done);
+        if seen.live == 0 {
+            continue;
+        }
+        for (place, lane) in lanes.into_iter().enumerate() {
+            let (bits, enters) = seen.meet(node, octant, lane);
+            entries.write_starts::<W, L>(next[place], bits, seen.ids, enters);
+            next[place] += bits.count_ones() as usize;
+        }
+    }
+    for (place, lane) in lanes.into_iter().enumerate() {
+        heads.push(node.ways[lane], begin[place], next[place] - begin[place]);
+    }
+}
+
+/// Takes a ray of a list by itself through a node: its boxes have the lanes then, as in a stream.
+#[inline(always)]
+pub fn take_one<L: Eight>(node: &Boxes, lot: &Lot, entries: &mut Entries, heads: &mut Heads, at: usize) {
+    let (id, tmin, _) = entries.one(at);
+    let (slabs, closest) = lot.slabs(id);
+    let Met { order, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest);
+    entries.write_starts_of(at, bits, id, enters);
+    heads.push_each::<L>(L::ids_pick(L::ids_load(&node.ways), order), bits, at);
+}
