@@ -16,6 +16,10 @@
 //!    Octants take turns, so that what a list needs is fetched while others have theirs.
 //! 4. What rays have found shortens them; rays that nothing is left of drop out of lists as these are cut.
 //!
+//! What lists go through is their [`ground`]. Where [`Pools`](crate::kdtree::Pools) have been made it is nodes of eight
+//! boxes, to which a list is put one box after the other ([`boxes`]), and pools, whose triangles a list meets as those of
+//! other leaves, and one or two rays sixteen at a time ([`pool`]).
+//!
 //! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
 //! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not
 //! ordinary (`range.rs`) are left to the packet kernel.
