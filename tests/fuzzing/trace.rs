@@ -39,26 +39,36 @@ pub fn build_and_trace(bytes: &[u8]) {
     // All triangles in one leaf: nothing there is left out.
     let one_leaf = BuildParams { min_leaf: 1 << 20, ..Default::default() };
     let all = Accel::build(&mesh, &one_leaf).expect("as before");
+    let pooled = Accel::build(&mesh, &params).expect("as before");
+    pooled.make_pools().expect("there are not too many leaves");
     let rays: Vec<Ray> = (0..rays).map(|_| bytes.ray(&mesh)).collect();
-    compare(accel, all, &rays);
+    compare(accel, all, pooled, &rays);
 }
 
 /// Compares every instruction set, accuracy and kernel with single rays in the plainest instruction set: portable SIMD
 /// but in a fuzzer's build, which has no other than the best.
-fn compare(mut accel: Accel, mut all: Accel, rays: &[Ray]) {
+fn compare(mut accel: Accel, mut all: Accel, mut pooled: Accel, rays: &[Ray]) {
     for accuracy in Accuracy::ALL {
         accel.set_accuracy(accuracy);
+        pooled.set_accuracy(accuracy);
         accel.set_isa(Isa::available()[0]);
         let expected: Vec<Hit> = rays.iter().map(|ray| accel.intersect(ray)).collect();
         for isa in Isa::available() {
             accel.set_isa(isa);
-            for kernel in Kernel::ALL {
+            pooled.set_isa(isa);
+            let ways = Kernel::ALL.iter().map(|&kernel| (kernel, &accel, ""));
+            // Those that go through pools, in modes that have them.
+            let through_pools = [Kernel::Single, Kernel::Stream, Kernel::Filter];
+            let has_pools = accuracy != Accuracy::Fast;
+            let with_pools =
+                through_pools.iter().filter(|_| has_pools).map(|&kernel| (kernel, &pooled, " with pools"));
+            for (kernel, accel, with) in ways.chain(with_pools) {
                 let mut hits = vec![Hit::MISS; rays.len()];
                 accel.intersect_many(kernel, rays, &mut hits);
                 let mut occluded = vec![false; rays.len()];
                 accel.occluded_many(kernel, rays, &mut occluded);
                 for (i, ray) in rays.iter().enumerate() {
-                    let at = || format!("{accuracy}, {kernel} on {isa}, ray {i}: {ray:?}");
+                    let at = || format!("{accuracy}, {kernel}{with} on {isa}, ray {i}: {ray:?}");
                     assert_eq!(
                         bits(&hits[i]),
                         bits(&expected[i]),
