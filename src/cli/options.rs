@@ -35,8 +35,8 @@ impl AccuracyOption {
 /// `--pools`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PoolsOption {
-    /// Keep leaves that hold their triangles' corners beside the tree, and boxes that lead to them: streams of rays that have
-    /// nothing in common are 1.1 to 2.3 times as fast, and the tree takes nearly twice the memory. Answers are the same
+    /// Keep leaves that hold their triangles' corners beside the tree, and boxes that lead to them: rays that have nothing in common
+    /// are 1.0 to 2.3 times as fast, and the tree takes nearly twice the memory. Answers are the same
     #[arg(long)]
     pools: bool,
 }

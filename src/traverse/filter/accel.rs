@@ -7,6 +7,7 @@ use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::Pools;
 use crate::simd::{Eight, Simd};
+use crate::traverse::pool::ways::Ways;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
 use crate::traverse::stream::{Answers, Any, Closest};
@@ -52,7 +53,7 @@ struct Filter<'a, A> {
 impl<A: ByEights> ResidentQuery for Filter<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        trace::<S, M, A>(tree, &OfLines(tree.tree), self.rays, &mut self.answers);
+        trace::<S, M, _, A>(tree, &OfLines(tree.tree), self.rays, &mut self.answers);
     }
 }
 
@@ -65,7 +66,7 @@ struct InBoxes<'a, A> {
 impl<A: ByEights> ResidentQuery for InBoxes<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        trace::<S, M, A>(tree, &OfBoxes(self.pools), self.rays, &mut self.answers);
+        trace::<S, M, _, A>(tree, &OfBoxes(Ways::new(self.pools)), self.rays, &mut self.answers);
     }
 }
 

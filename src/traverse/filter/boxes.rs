@@ -9,7 +9,7 @@
 //! ends is not kept, as nobody asks.
 
 use super::cut::present;
-use super::lists::{Entries, Heads, List, SLACK};
+use super::lists::{Entries, Heads, List};
 use super::lot::Lot;
 use crate::kdtree::Boxes;
 use crate::simd::{Dense, Eight, Lanes, Mask};
@@ -71,7 +71,7 @@ pub fn cut<const W: usize, L: Dense<W>>(
     list: &List,
 ) {
     let (at, len) = (list.at as usize, list.len as usize);
-    let lanes: [usize; 8] = node.lanes(octant);
+    let lanes = node.lanes(octant);
     if len <= W {
         // All are in registers, and what comes out takes their place.
         let seen = Seen::<W, L>::new(lot, entries, at, len);
@@ -87,11 +87,7 @@ pub fn cut<const W: usize, L: Dense<W>>(
     }
 
     // A place for each box, behind the list.
-    let stride = (len + 2 * SLACK - 1) & !(SLACK - 1);
-    let mut begin = [0; 8];
-    for place in 0..8 {
-        begin[place] = at + (place + 1) * stride;
-    }
+    let begin = list.behind();
     let mut next = begin;
     for done in (0..len).step_by(W) {
         let seen = Seen::<W, L>::new(lot, entries, at + done, len - done);
@@ -111,7 +107,8 @@ pub fn cut<const W: usize, L: Dense<W>>(
 
 /// Takes a ray of a list by itself through a node: its boxes have the lanes then, as in a stream.
 #[inline(always)]
-pub fn take_one<L: Eight>(node: &Boxes, lot: &Lot, entries: &mut Entries, heads: &mut Heads, at: usize) {
+pub fn take_one<L: Eight>(node: &Boxes, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
+    let at = list.at as usize;
     let (id, tmin, _) = entries.one(at);
     let (slabs, closest) = lot.slabs(id);
     let Met { order, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest);

@@ -5,7 +5,7 @@
 //! included (`walk.rs` says why they are thick): each exit gets the rays of which something is left after the three walls
 //! on the way to it.
 
-use super::lists::{Entries, Heads, List, SLACK};
+use super::lists::{Entries, Heads, List};
 use super::lot::{Crossing, Lot};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Mask};
@@ -112,11 +112,7 @@ pub fn cut<const W: usize, L: Dense<W>, F: Eight>(
     }
 
     // A place for each exit, behind the list.
-    let stride = (len + 2 * SLACK - 1) & !(SLACK - 1);
-    let mut begin = [0; 8];
-    for order in 0..8 {
-        begin[order] = at + (order + 1) * stride;
-    }
+    let begin = list.behind();
     let mut next = begin;
     let mut done = 0;
     while done < len {

@@ -2,59 +2,62 @@
 
 use super::boxes;
 use super::cut;
-use super::leaf::{self, SIFTED};
+use super::leaf::SIFTED;
 use super::lists::{Entries, Heads, List};
 use super::lot::Lot;
 use super::pool;
 use crate::geometry::triangle::Mode;
-use crate::kdtree::{Chunk, Exit, KdTree, Pools, Way};
-use crate::simd::{Simd, prefetch};
+use crate::kdtree::{Chunk, Exit, KdTree, Way};
+use crate::simd::{Dense, Eight, Sixteen, prefetch};
+use crate::traverse::pool::ways::Ways;
 use crate::traverse::records::Resident;
 use std::hint::select_unpredictable;
 
 /// Inner places that lists are cut at, and leaves.
 pub trait Ground {
-    /// Whether a list's place is a leaf.
+    /// Lists of so many rays, or fewer, go through a leaf ray by ray.
+    const FEW: u32;
+
+    /// Whether a place is a leaf.
     fn is_leaf(&self, place: i32) -> bool;
 
     /// Fetches what tells what is in a place. (Any number may be one.)
     fn fetch(&self, place: i32);
 
-    /// Fetches the triangles of the leaf that a list is in.
-    fn fetch_leaf<R>(&self, resident: &Resident<'_, R>, list: &List);
+    /// Takes a list of one ray through an inner place, and puts what comes out on the stack, the nearest on top.
+    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List);
 
-    /// Cuts a list at a place of rays that run into an octant, and puts what comes out on the stack, the nearest on top.
-    fn cut<S: Simd>(&self, octant: usize, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List);
-
-    /// Tests the triangles of a leaf against the rays of a list.
-    fn test<S: Simd, M: Mode, const ANY: bool>(
+    /// The same of a longer list, of rays that run into an octant, `W` at a time.
+    fn cut<const W: usize, L: Dense<W>, F: Eight>(
         &self,
-        resident: &Resident<'_, M::Record>,
-        lot: &mut Lot,
-        entries: &Entries,
+        octant: usize,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
         list: &List,
     );
-}
 
-/// Whether sixteen lanes do better than eight: for lists that fill more than half of them.
-#[inline(always)]
-fn is_wide<S: Simd>(list: &List) -> bool {
-    S::NATIVE == 16 && list.len > 8
+    /// The triangles of the leaf that a list is in, up to [`SIFTED`] at a time.
+    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone;
+
+    /// Tests those against the rays of a list one by one. Who has no [`FEW`](Self::FEW) is not asked.
+    #[inline(always)]
+    fn test_few<L: Sixteen, M: Mode, const ANY: bool>(
+        &self,
+        _resident: &Resident<'_, M::Record>,
+        _lot: &mut Lot,
+        _entries: &Entries,
+        _list: &List,
+    ) {
+    }
 }
 
 /// The lines of a tree, whose leaves name their triangles.
 pub struct OfLines<'a>(pub &'a KdTree);
 
-impl<'a> OfLines<'a> {
-    /// The triangles of the leaf that a list is in.
-    #[inline(always)]
-    fn leaf(&self, list: &List) -> impl Iterator<Item = &'a [u32]> + Clone + use<'a> {
-        let words = &self.0.references()[Exit(list.exit).record()..];
-        words[1..][..words[0] as usize].chunks(SIFTED)
-    }
-}
-
 impl Ground for OfLines<'_> {
+    const FEW: u32 = 0;
+
     #[inline(always)]
     fn is_leaf(&self, place: i32) -> bool {
         Exit(place).is_leaf()
@@ -69,53 +72,45 @@ impl Ground for OfLines<'_> {
     }
 
     #[inline(always)]
-    fn fetch_leaf<R>(&self, resident: &Resident<'_, R>, list: &List) {
-        leaf::fetch(resident, self.leaf(list));
+    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
+        cut::take_one::<F>(&self.0.lines()[Exit(list.exit).line()], lot, entries, heads, list);
     }
 
     #[inline(always)]
-    fn cut<S: Simd>(&self, octant: usize, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
-        let line = &self.0.lines()[Exit(list.exit).line()];
-        if list.len == 1 {
-            cut::take_one::<S::F8>(line, lot, entries, heads, list);
-        } else if is_wide::<S>(list) {
-            cut::cut::<16, S::F16, S::F8>(line, octant, lot, entries, heads, list);
-        } else {
-            cut::cut::<8, S::F8, S::F8>(line, octant, lot, entries, heads, list);
-        }
-    }
-
-    #[inline(always)]
-    fn test<S: Simd, M: Mode, const ANY: bool>(
+    fn cut<const W: usize, L: Dense<W>, F: Eight>(
         &self,
-        resident: &Resident<'_, M::Record>,
-        lot: &mut Lot,
-        entries: &Entries,
+        octant: usize,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
         list: &List,
     ) {
-        if is_wide::<S>(list) {
-            leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, list, self.leaf(list));
-        } else {
-            leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, list, self.leaf(list));
-        }
+        cut::cut::<W, L, F>(&self.0.lines()[Exit(list.exit).line()], octant, lot, entries, heads, list);
+    }
+
+    #[inline(always)]
+    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone {
+        let words = &self.0.references()[Exit(list.exit).record()..];
+        words[1..][..words[0] as usize].chunks(SIFTED)
     }
 }
 
 /// Nodes of boxes, and pools.
-pub struct OfBoxes<'a>(pub &'a Pools);
+pub struct OfBoxes<'a>(pub Ways<'a>);
 
-/// Rays of a list, or fewer, that meet a pool one by one, sixteen triangles at a time.
-const FEW: u32 = 2;
+impl OfBoxes<'_> {
+    /// The chunks of the pool that a list is in.
+    #[inline(always)]
+    fn chunks(&self, list: &List) -> Chunks<'_> {
+        Chunks { words: self.0.words, next: Way(list.exit).word() }
+    }
+}
 
-/// Words in a line of the cache, and lines that a node has, and most chunks lie in.
-const LINE: usize = 16;
-const FETCHED: usize = 4;
-
-/// The triangles of a pool, chunk by chunk.
+/// The chunks of a pool.
 #[derive(Clone)]
 pub struct Chunks<'a> {
     words: &'a [u32],
-    /// The first word of the next chunk, or 0.
+    /// The first word of the next one, or 0.
     next: usize,
 }
 
@@ -133,21 +128,15 @@ impl<'a> Iterator for Chunks<'a> {
     }
 }
 
-impl<'a> OfBoxes<'a> {
-    /// The chunks of the pool that a list is in.
-    #[inline(always)]
-    fn chunks(&self, list: &List) -> Chunks<'a> {
-        Chunks { words: self.0.words(), next: Way(list.exit).word() }
-    }
-}
-
 /// A chunk's triangles.
 #[inline(always)]
-fn primitives<'a>(chunk: Chunk<'a>) -> &'a [u32] {
+fn primitives(chunk: Chunk<'_>) -> &[u32] {
     &bytemuck::cast_ref::<[i32; SIFTED], [u32; SIFTED]>(chunk.ids())[..chunk.count().min(SIFTED)]
 }
 
 impl Ground for OfBoxes<'_> {
+    const FEW: u32 = 2;
+
     #[inline(always)]
     fn is_leaf(&self, place: i32) -> bool {
         Way(place).is_pool()
@@ -155,57 +144,41 @@ impl Ground for OfBoxes<'_> {
 
     #[inline(always)]
     fn fetch(&self, place: i32) {
-        let way = Way(place);
-        let node = self.0.nodes().as_ptr().wrapping_add(way.node()).cast::<u32>();
-        let chunk = self.0.words().as_ptr().wrapping_add(way.word());
-        let first = select_unpredictable(way.is_pool(), chunk, node);
-        for line in 0..FETCHED {
-            prefetch(first.wrapping_add(LINE * line));
-        }
+        self.0.fetch(place);
     }
 
     #[inline(always)]
-    fn fetch_leaf<R>(&self, resident: &Resident<'_, R>, list: &List) {
-        if list.len > FEW {
-            leaf::fetch(resident, self.chunks(list).map(primitives));
-        }
+    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
+        boxes::take_one::<F>(&self.0.nodes[Way(list.exit).node()], lot, entries, heads, list);
     }
 
     #[inline(always)]
-    fn cut<S: Simd>(&self, octant: usize, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
-        let node = &self.0.nodes()[Way(list.exit).node()];
-        if list.len == 1 {
-            boxes::take_one::<S::F8>(node, lot, entries, heads, list.at as usize);
-        } else if is_wide::<S>(list) {
-            boxes::cut::<16, S::F16>(node, octant, lot, entries, heads, list);
-        } else {
-            boxes::cut::<8, S::F8>(node, octant, lot, entries, heads, list);
-        }
+    fn cut<const W: usize, L: Dense<W>, F: Eight>(
+        &self,
+        octant: usize,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    ) {
+        boxes::cut::<W, L>(&self.0.nodes[Way(list.exit).node()], octant, lot, entries, heads, list);
     }
 
     #[inline(always)]
-    fn test<S: Simd, M: Mode, const ANY: bool>(
+    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone {
+        self.chunks(list).map(primitives)
+    }
+
+    #[inline(always)]
+    fn test_few<L: Sixteen, M: Mode, const ANY: bool>(
         &self,
         resident: &Resident<'_, M::Record>,
         lot: &mut Lot,
         entries: &Entries,
         list: &List,
     ) {
-        let leaf = self.chunks(list).map(primitives);
-        if list.len <= FEW {
-            for ray in 0..list.len {
-                pool::test_one::<S::F16, M, ANY>(
-                    resident,
-                    lot,
-                    entries,
-                    (list.at + ray) as usize,
-                    self.chunks(list),
-                );
-            }
-        } else if is_wide::<S>(list) {
-            leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, list, leaf);
-        } else {
-            leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, list, leaf);
+        for at in list.at..list.at + list.len {
+            pool::test_one::<L, M, ANY>(resident, lot, entries, at as usize, self.chunks(list));
         }
     }
 }

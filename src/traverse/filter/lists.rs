@@ -10,7 +10,7 @@ const LEVELS: usize = crate::kdtree::MAX_DEPTH;
 pub const DEPTH: usize = (LEVELS * 7 + 2).next_power_of_two();
 
 /// What a list may take beyond its rays: it is written by whole registers.
-pub const SLACK: usize = 16;
+const SLACK: usize = 16;
 
 /// Entries that so many rays of an octant can take: at each line on a way those of the list that was cut, and up to as many
 /// at each exit.
@@ -29,6 +29,16 @@ pub struct List {
     /// Where the list's first entry is, and how many there are.
     pub at: u32,
     pub len: u32,
+}
+
+impl List {
+    /// Where eight lists begin behind this one, each with room for all of its rays.
+    #[inline(always)]
+    pub fn behind(&self) -> [usize; 8] {
+        let (at, len) = (self.at as usize, self.len as usize);
+        let stride = (len + 2 * SLACK - 1) & !(SLACK - 1);
+        [1, 2, 3, 4, 5, 6, 7, 8].map(|place| at + place * stride)
+    }
 }
 
 /// Lists that wait.
@@ -119,11 +129,8 @@ impl Entries {
     /// Some rays' numbers, and their intervals.
     #[inline(always)]
     pub fn load<const W: usize, L: Dense<W>>(&self, at: usize) -> ([i32; W], L, L) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        let ids = *self.ids[at..].first_chunk().expect(room);
-        let tmin = L::load(self.tmin[at..].first_chunk().expect(room));
-        let tmax = L::load(self.tmax[at..].first_chunk().expect(room));
-        (ids, tmin, tmax)
+        let (ids, tmin) = self.starts::<W, L>(at);
+        (ids, tmin, L::load(self.tmax[at % ENTRIES..].first_chunk().expect("a register behind each")))
     }
 
     /// Some rays' numbers, and where their intervals begin.
@@ -144,10 +151,8 @@ impl Entries {
     /// Writes one ray's intervals whose bits are set one behind the other.
     #[inline(always)]
     pub fn write_each<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L, tmax: L) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        *self.ids[at..].first_chunk_mut().expect(room) = [id; 8];
-        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
-        tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
+        self.write_starts_of(at, bits, id, tmin);
+        tmax.compact(bits, self.tmax[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
     }
 
     /// Writes those of some rays whose bits are set one behind the other.
@@ -160,13 +165,11 @@ impl Entries {
         tmin: L,
         tmax: L,
     ) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
-        tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
-        tmax.close_up(bits, self.tmax[at..].first_chunk_mut().expect(room));
+        self.write_starts::<W, L>(at, bits, ids, tmin);
+        tmax.close_up(bits, self.tmax[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
     }
 
-    /// Writes those of some rays whose bits are set one behind the other, without the ends of their intervals.
+    /// The same without the ends of the intervals, for who does not ask for them.
     #[inline(always)]
     pub fn write_starts<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids, tmin: L) {
         let (at, room) = (at % ENTRIES, "a register behind each");

@@ -258,9 +258,7 @@ impl Lot {
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize % W;
             bits &= bits - 1;
-            let traveller = &mut self.travellers[ids[lane] as usize % LOT];
-            traveller.start[3] = t[lane];
-            traveller.inverse[3] = f32::from_bits(primitives[lane] as u32);
+            self.keep_one(ids[lane], t[lane], primitives[lane]);
         }
     }
 

@@ -92,9 +92,9 @@ thread_local! {
 
 /// Traces rays through some ground and gives an answer for each.
 #[inline(always)]
-fn trace<S: Simd, M: Mode, A: ByEights>(
+fn trace<S: Simd, M: Mode, G: Ground, A: ByEights>(
     resident: &Resident<'_, M::Record>,
-    ground: &impl Ground,
+    ground: &G,
     rays: Source<'_>,
     answers: &mut A,
 ) {
@@ -115,9 +115,9 @@ fn trace<S: Simd, M: Mode, A: ByEights>(
         } else {
             room.lot.prepare::<S::F8>(rays, eights.clone(), resident.bounds());
             if A::ANY {
-                walk::<S, M, true>(resident, ground, room);
+                walk::<S, M, G, true>(resident, ground, room);
             } else {
-                walk::<S, M, false>(resident, ground, room);
+                walk::<S, M, G, false>(resident, ground, room);
             }
         }
         give::<S, M, A>(resident, rays, eights, &room.lot, answers);
@@ -129,9 +129,9 @@ fn trace<S: Simd, M: Mode, A: ByEights>(
 ///
 /// Octants take turns, a list each, so that what a list needs of memory can be fetched while the others have theirs.
 #[inline(always)]
-fn walk<S: Simd, M: Mode, const ANY: bool>(
+fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(
     resident: &Resident<'_, M::Record>,
-    ground: &impl Ground,
+    ground: &G,
     room: &mut Room,
 ) {
     let Room { lot, entries, heads } = room;
@@ -153,15 +153,31 @@ fn walk<S: Simd, M: Mode, const ANY: bool>(
                 waiting &= !(1 << octant);
                 continue;
             };
+            // Sixteen lanes for lists that fill more than half of them.
+            let wide = S::NATIVE == 16 && list.len > 8;
             if !ground.is_leaf(list.exit) {
-                ground.cut::<S>(octant, lot, entries, heads, &list);
+                if list.len == 1 {
+                    ground.take_one::<S::F8>(lot, entries, heads, &list);
+                } else if wide {
+                    ground.cut::<16, S::F16, S::F8>(octant, lot, entries, heads, &list);
+                } else {
+                    ground.cut::<8, S::F8, S::F8>(octant, lot, entries, heads, &list);
+                }
                 ground.fetch(heads.top());
             } else if fetched >> octant & 1 == 0 {
-                ground.fetch_leaf(resident, &list);
+                if list.len > G::FEW {
+                    leaf::fetch(resident, ground.leaf(&list));
+                }
                 heads.keep();
                 fetched |= 1 << octant;
             } else {
-                ground.test::<S, M, ANY>(resident, lot, entries, &list);
+                if list.len <= G::FEW {
+                    ground.test_few::<S::F16, M, ANY>(resident, lot, entries, &list);
+                } else if wide {
+                    leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, &list, ground.leaf(&list));
+                } else {
+                    leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, &list, ground.leaf(&list));
+                }
                 ground.fetch(heads.top());
                 fetched &= !(1 << octant);
             }

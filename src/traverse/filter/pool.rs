@@ -3,9 +3,10 @@
 use super::ground::Chunks;
 use super::lists::Entries;
 use super::lot::Lot;
-use crate::geometry::triangle::pooled::{Prospects, Sixteens};
+use crate::geometry::triangle::pooled::Prospects;
 use crate::geometry::triangle::{Mode, Test};
 use crate::simd::{Mask, Sixteen};
+use crate::traverse::pool::ways::prospects;
 use crate::traverse::records::Resident;
 
 /// Tests a pool's triangles against the ray of an entry. With `ANY`, it is done at its first hit.
@@ -26,16 +27,7 @@ pub fn test_one<L: Sixteen, M: Mode, const ANY: bool>(
     }
     let pooled = lot.pooled(&ray);
     for chunk in chunks {
-        let triangles = Sixteens {
-            rows: pooled.renamed().map(|axis| chunk.row(axis)),
-            corners: chunk.corners(),
-            count: chunk.count(),
-        };
-        let Prospects { possible, certain, .. } = if M::SIGNS {
-            pooled.prospects::<L, true>(&triangles, ray.tnear, closest)
-        } else {
-            pooled.prospects::<L, false>(&triangles, ray.tnear, closest)
-        };
+        let Prospects { possible, certain, .. } = prospects::<L, M>(&pooled, chunk, ray.tnear, closest);
         let certain = certain.bits();
         if ANY && certain != 0 {
             lot.keep_one(id, f32::NEG_INFINITY, chunk.ids()[certain.trailing_zeros() as usize % 16]);

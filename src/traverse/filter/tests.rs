@@ -1,14 +1,14 @@
 //! What lists of rays are to be, and that none is lost.
 
-use super::boxes;
-use super::cut::{cut, take_one};
+use super::ground::{Ground, OfBoxes, OfLines};
 use super::lists::{Entries, Heads, List};
 use super::lot::{LOT, Lot};
 use super::source::Source;
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::kdtree::{BuildParams, Tree};
+use crate::kdtree::{BuildParams, Exit, Tree};
 use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, Task};
+use crate::traverse::pool::ways::Ways;
 use crate::traverse::{Accel, Kernel, RayPacket};
 use glam::Vec3;
 use std::collections::HashSet;
@@ -41,9 +41,15 @@ fn rays(count: usize, everywhere: bool, seed: f64) -> Vec<Ray> {
         .collect()
 }
 
-/// What waits after lists of some lengths were cut at the first lines of a tree: exit, ray, and the bits of its interval; and
-/// the same of each ray alone.
-struct Cuts<'a>(&'a Accel, &'a [Ray]);
+/// What waits after lists of some lengths were cut at the first lines of a tree, or nodes of boxes: exit, ray, and the bits of
+/// its interval; by eights, by sixteens, and each ray alone.
+struct Cuts<'a>(&'a Accel, &'a [Ray], Kind);
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Lines,
+    Boxes,
+}
 
 type Waiting = Vec<(i32, i32, [u32; 2])>;
 
@@ -52,78 +58,55 @@ impl Task for Cuts<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let (tree, rays) = (self.0.tree(), self.1);
-        let mut lot = Box::new(Lot::new());
-        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), tree.bounds());
-        let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
-        for octant in 0..8 {
-            let ids = lot.octant(octant);
-            for (i, line) in tree.lines().iter().take(40).enumerate() {
-                let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
-                let begin = |entries: &mut Entries| {
-                    entries.begin(&ids[..len], &lot, 0);
-                    List { exit: 0, at: 0, len: len as u32 }
-                };
-                let list = begin(&mut entries);
-                cut::<8, S::F8, S::F8>(line, octant, &lot, &mut entries, &mut heads, &list);
-                let by_eights = all(&entries, &mut heads);
-                let list = begin(&mut entries);
-                cut::<16, S::F16, S::F8>(line, octant, &lot, &mut entries, &mut heads, &list);
-                let by_sixteens = all(&entries, &mut heads);
-                let mut alone = Vec::new();
-                for ray in 0..len {
-                    entries.begin(&ids[ray..=ray], &lot, 0);
-                    let list = List { exit: 0, at: 0, len: 1 };
-                    take_one::<S::F8>(line, &lot, &mut entries, &mut heads, &list);
-                    alone.extend(all(&entries, &mut heads));
-                }
-                found.push([by_eights, by_sixteens, alone].map(|mut all| {
-                    all.sort_unstable();
-                    all
-                }));
-            }
+        let tree = self.0.tree();
+        if self.2 == Kind::Lines {
+            let lines = (0..tree.lines().len()).map(|line| Exit::of_line(line).0).take(40);
+            self.through::<S, _>(&OfLines(tree), lines)
+        } else {
+            // Not many rays come to those that lie deeper.
+            let nodes = (0..4).cycle().take(40);
+            self.through::<S, _>(&OfBoxes(Ways::new(tree.pools().expect("they were made"))), nodes)
         }
-        found
     }
 }
 
-/// What waits after lists of some lengths met the first nodes of boxes, by eights and by sixteens; and after each ray alone did.
-struct Meets<'a>(&'a Accel, &'a [Ray]);
-
-impl Task for Meets<'_> {
-    type Output = Vec<[Waiting; 3]>;
-
+impl Cuts<'_> {
     #[inline(always)]
-    fn run<S: Simd>(self) -> Self::Output {
-        let (tree, rays) = (self.0.tree(), self.1);
-        let nodes = tree.pools().expect("they were made").nodes();
+    fn through<S: Simd, G: Ground>(
+        &self,
+        ground: &G,
+        places: impl Iterator<Item = i32> + Clone,
+    ) -> Vec<[Waiting; 3]> {
+        let Self(accel, rays, kind) = self;
         let mut lot = Box::new(Lot::new());
-        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), tree.bounds());
+        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), accel.tree().bounds());
         let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
         for octant in 0..8 {
             let ids = lot.octant(octant);
-            // Not many rays come to those that lie deeper.
-            for (i, node) in nodes.iter().take(4).cycle().take(40).enumerate() {
+            for (i, exit) in places.clone().enumerate() {
                 let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
                 let begin = |entries: &mut Entries| {
                     entries.begin(&ids[..len], &lot, 0);
-                    List { exit: 0, at: 0, len: len as u32 }
+                    List { exit, at: 0, len: len as u32 }
                 };
                 let list = begin(&mut entries);
-                boxes::cut::<8, S::F8>(node, octant, &lot, &mut entries, &mut heads, &list);
+                ground.cut::<8, S::F8, S::F8>(octant, &lot, &mut entries, &mut heads, &list);
                 let by_eights = all(&entries, &mut heads);
                 let list = begin(&mut entries);
-                boxes::cut::<16, S::F16>(node, octant, &lot, &mut entries, &mut heads, &list);
+                ground.cut::<16, S::F16, S::F8>(octant, &lot, &mut entries, &mut heads, &list);
                 let by_sixteens = all(&entries, &mut heads);
                 let mut alone = Vec::new();
                 for ray in 0..len {
                     entries.begin(&ids[ray..=ray], &lot, 0);
-                    boxes::take_one::<S::F8>(node, &lot, &mut entries, &mut heads, 0);
+                    let list = List { exit, at: 0, len: 1 };
+                    ground.take_one::<S::F8>(&lot, &mut entries, &mut heads, &list);
                     alone.extend(all(&entries, &mut heads));
                 }
                 found.push([by_eights, by_sixteens, alone].map(|mut all| {
-                    // Where intervals end is not kept.
-                    all.iter_mut().for_each(|(.., [_, tmax])| *tmax = 0);
+                    if *kind == Kind::Boxes {
+                        // Where intervals end is not kept.
+                        all.iter_mut().for_each(|(.., [_, tmax])| *tmax = 0);
+                    }
                     all.sort_unstable();
                     all
                 }));
@@ -150,7 +133,7 @@ fn a_list_is_cut_as_each_of_its_rays_is() {
     let accel = Accel::build(&shapes::soup(3000, 1), &BuildParams::default()).expect("a soup has a tree");
     let rays = rays(2000, true, 0.3);
     for isa in Isa::available() {
-        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays));
+        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays, Kind::Lines));
         assert!(
             found.iter().map(|[alone, ..]| alone.len()).sum::<usize>() > 10_000,
             "there is something to cut"
@@ -179,7 +162,7 @@ fn a_list_meets_boxes_as_each_of_its_rays_does() {
     let [_, accel] = trees(3000, 1);
     let rays = rays(2000, true, 0.3);
     for isa in Isa::available() {
-        let found = Chosen::new(isa).expect("it is available").run(Meets(&accel, &rays));
+        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays, Kind::Boxes));
         let (mut all, mut other) = (0, 0);
         for (i, [by_eights, by_sixteens, alone]) in found.into_iter().enumerate() {
             assert_eq!(by_eights, by_sixteens, "{isa}, node {i}");

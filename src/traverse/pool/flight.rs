@@ -6,8 +6,9 @@
 //! asked of those ([`answers`](super::answers)).
 
 use super::step::Slabs;
+use super::ways::prospects;
 use crate::geometry::Ray;
-use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
+use crate::geometry::triangle::pooled::{Pooled, Prospects};
 use crate::geometry::triangle::{Candidate, Mode, Test};
 use crate::kdtree::{Chunk, MOST};
 use crate::simd::{Mask, Sixteen};
@@ -76,16 +77,8 @@ impl Flight {
     #[inline(always)]
     pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize, any: bool) -> Finds {
         let chunk = Chunk::at(words, first);
-        let triangles = Sixteens {
-            rows: self.pooled.renamed().map(|axis| chunk.row(axis)),
-            corners: chunk.corners(),
-            count: chunk.count(),
-        };
-        let Prospects { possible, certain, first, last } = if M::SIGNS {
-            self.pooled.prospects::<L, true>(&triangles, self.tnear, self.tfar)
-        } else {
-            self.pooled.prospects::<L, false>(&triangles, self.tnear, self.tfar)
-        };
+        let Prospects { possible, certain, first, last } =
+            prospects::<L, M>(&self.pooled, chunk, self.tnear, self.tfar);
         if !any {
             self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
         }

@@ -23,44 +23,20 @@ mod answers;
 mod flight;
 mod start;
 pub mod step;
+pub mod ways;
 
 use super::records::Resident;
 use super::stream::step::{END, Waiting};
 use super::stream::{IN_FLIGHT, Set, with_stacks};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
-use crate::kdtree::{Boxes, Pools, Tree, Way};
-use crate::simd::{Simd, prefetch};
+use crate::kdtree::{Pools, Tree, Way};
+use crate::simd::Simd;
 use answers::{Pairs, Told};
 use flight::{Finds, Flight};
 use start::Starts;
-use std::hint::select_unpredictable;
 use step::step;
-
-/// Where rays go on.
-struct Ways<'a> {
-    nodes: &'a [Boxes],
-    words: &'a [u32],
-}
-
-impl Ways<'_> {
-    /// Fetches what a ray will need that goes a way, or most of it, and says whether that is a pool, or the end.
-    #[inline(always)]
-    fn fetch(&self, way: i32) -> bool {
-        let way = Way(way);
-        let node = self.nodes.as_ptr().wrapping_add(way.node()).cast::<u32>();
-        let chunk = self.words.as_ptr().wrapping_add(way.word());
-        let first = select_unpredictable(way.is_pool(), chunk, node);
-        for line in 0..FETCHED {
-            prefetch(first.wrapping_add(LINE * line));
-        }
-        way.is_pool()
-    }
-}
-
-/// Words in a line of the cache, and lines that a node has, and most chunks lie in.
-const LINE: usize = 16;
-const FETCHED: usize = 4;
+use ways::Ways;
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
@@ -89,9 +65,8 @@ fn fly<S: Simd, M: Mode, A: Told>(
         answers.all_odd::<M>(resident, rays);
         return;
     }
-    let (nodes, words) = (pools.nodes(), pools.words());
     let mut flights = [Flight::NONE; IN_FLIGHT];
-    let ways = Ways { nodes, words };
+    let ways = Ways::new(pools);
     // Rays that wait for the same: those that are at a node; at a chunk, or their end; that found something; that hit
     // something, where any hit will do.
     let (mut at_node, mut at_chunk, mut more_chunks) = (Set::NONE, Set::NONE, Set::NONE);
@@ -135,7 +110,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
                 free.put_if(k, true);
                 continue;
             }
-            let Finds { possible, certain, next } = flight.look::<S::F16, M>(words, way.word(), A::ANY);
+            let Finds { possible, certain, next } = flight.look::<S::F16, M>(ways.words, way.word(), A::ANY);
             waiting.exits[top] = way.further(next).0;
             flight.top -= u32::from(next == 0);
             let ends = A::ANY & certain;
@@ -171,7 +146,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
             let at = (top, Way(waiting.exits[top]));
-            let (top, way) = step::<S::F8>(nodes, &flight.slabs, waiting, at, flight.tnear, flight.tfar);
+            let (top, way) = step::<S::F8>(ways.nodes, &flight.slabs, waiting, at, flight.tnear, flight.tfar);
             flight.top = top as u32;
             at_chunk.put_if(k, ways.fetch(way.0));
         }
