@@ -53,6 +53,12 @@ impl<'a> Chunk<'a> {
         self.field(0, 5)
     }
 
+    /// How many vertices they have.
+    #[inline(always)]
+    pub const fn vertices(self) -> usize {
+        self.field(5, 5)
+    }
+
     /// How many words behind its first the leaf's next chunk begins; 0 if it is the last.
     #[inline(always)]
     pub const fn next(self) -> usize {

@@ -1,15 +1,16 @@
 //! Lists of rays through an [`Accel`].
 
 use super::ground::{OfBoxes, OfLines};
-use super::source::Source;
 use super::{ByEights, trace};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::Pools;
 use crate::simd::{Eight, Simd};
+use crate::traverse::pool::answers::{Met16, Pairs, Told};
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
+use crate::traverse::source::Source;
 use crate::traverse::stream::{Answers, Any, Closest};
 use crate::traverse::{Accel, RayPacket, closest};
 
@@ -93,15 +94,28 @@ impl Answers for Found<'_> {
     }
 }
 
+impl Told for Found<'_> {
+    #[inline(always)]
+    fn tell<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &Pairs,
+        count: usize,
+        found: &Met16<S::F16>,
+    ) {
+        for ray in found.rays::<M>(tree, rays, pairs, count) {
+            match self {
+                Self::Rays(rays) => rays[ray] = true,
+                Self::Lanes(lanes) => lanes[ray / 16] |= 1 << (ray % 16),
+            }
+        }
+    }
+}
+
 impl ByEights for Found<'_> {
     #[inline(always)]
-    fn found_by_eight<L: Eight, M: Mode>(
-        &mut self,
-        _: &Resident<'_, M::Record>,
-        _: Source<'_>,
-        eight: usize,
-        closest: &closest::Closest<8, L>,
-    ) {
+    fn give<L: Eight>(&mut self, eight: usize, closest: &closest::Closest<8, L>) {
         let found = closest.found() & 0xff;
         match self {
             Self::Rays(rays) => {

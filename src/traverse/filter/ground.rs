@@ -1,11 +1,11 @@
 //! What lists go through on their way to triangles: the lines of a tree and its leaves, or nodes of boxes and pools.
 
-use super::boxes;
-use super::cut;
-use super::leaf::SIFTED;
+use super::candidates::Candidates;
+use super::leaf::{self, SIFTED};
 use super::lists::{Entries, Heads, List};
 use super::lot::Lot;
-use super::pool;
+use super::pool::{self, Seen};
+use super::{boxes, cut};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::{Chunk, Exit, KdTree, Way};
 use crate::simd::{Dense, Eight, Sixteen, prefetch};
@@ -17,6 +17,12 @@ use std::hint::select_unpredictable;
 pub trait Ground {
     /// Lists of so many rays, or fewer, go through a leaf ray by ray.
     const FEW: u32;
+
+    /// Whether [shears](crate::geometry::triangle::pooled::shears) are kept of rays in place of directions.
+    const SHEARS: bool;
+
+    /// Whether a leaf's triangles are fetched a turn before a list meets them.
+    const FETCHES: bool;
 
     /// Whether a place is a leaf.
     fn is_leaf(&self, place: i32) -> bool;
@@ -37,26 +43,45 @@ pub trait Ground {
         list: &List,
     );
 
-    /// The triangles of the leaf that a list is in, up to [`SIFTED`] at a time.
-    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone;
+    /// Fetches the triangles of the leaf that a list is in.
+    fn fetch_triangles<R>(&self, resident: &Resident<'_, R>, list: &List);
 
-    /// Tests those against the rays of a list one by one. Who has no [`FEW`](Self::FEW) is not asked.
-    #[inline(always)]
-    fn test_few<L: Sixteen, M: Mode, const ANY: bool>(
+    /// Has the rays of a list meet the triangles of the leaf that it is in, `W` rays at a time.
+    fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
         &self,
-        _resident: &Resident<'_, M::Record>,
-        _lot: &mut Lot,
-        _entries: &Entries,
-        _list: &List,
-    ) {
-    }
+        resident: &Resident<'_, M::Record>,
+        room: &mut Rays,
+        entries: &Entries,
+        list: &List,
+    );
+
+    /// The same ray by ray.
+    fn meet_few<L: Sixteen, M: Mode, const ANY: bool>(&self, room: &mut Rays, entries: &Entries, list: &List);
+}
+
+/// A lot's rays, and what they may hit.
+pub struct Rays {
+    pub lot: Lot,
+    pub candidates: Candidates,
+    pub seen: Seen,
 }
 
 /// The lines of a tree, whose leaves name their triangles.
 pub struct OfLines<'a>(pub &'a KdTree);
 
+impl OfLines<'_> {
+    /// The triangles of a leaf, up to [`SIFTED`] at a time.
+    #[inline(always)]
+    fn triangles(&self, list: &List) -> impl Iterator<Item = &[u32]> + Clone {
+        let words = &self.0.references()[Exit(list.exit).record()..];
+        words[1..][..words[0] as usize].chunks(SIFTED)
+    }
+}
+
 impl Ground for OfLines<'_> {
     const FEW: u32 = 0;
+    const SHEARS: bool = false;
+    const FETCHES: bool = true;
 
     #[inline(always)]
     fn is_leaf(&self, place: i32) -> bool {
@@ -89,14 +114,30 @@ impl Ground for OfLines<'_> {
     }
 
     #[inline(always)]
-    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone {
-        let words = &self.0.references()[Exit(list.exit).record()..];
-        words[1..][..words[0] as usize].chunks(SIFTED)
+    fn fetch_triangles<R>(&self, resident: &Resident<'_, R>, list: &List) {
+        leaf::fetch(resident, self.triangles(list));
     }
+
+    #[inline(always)]
+    fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
+        &self,
+        resident: &Resident<'_, M::Record>,
+        rays: &mut Rays,
+        entries: &Entries,
+        list: &List,
+    ) {
+        leaf::test::<W, L, M, ANY>(resident, &mut rays.lot, entries, list, self.triangles(list));
+    }
+
+    #[inline(always)]
+    fn meet_few<L: Sixteen, M: Mode, const ANY: bool>(&self, _: &mut Rays, _: &Entries, _: &List) {}
 }
 
 /// Nodes of boxes, and pools.
 pub struct OfBoxes<'a>(pub Ways<'a>);
+
+/// What few rays are in a pool: by themselves they meet its triangles all at once.
+const FEW: u32 = 2;
 
 impl OfBoxes<'_> {
     /// The chunks of the pool that a list is in.
@@ -128,14 +169,10 @@ impl<'a> Iterator for Chunks<'a> {
     }
 }
 
-/// A chunk's triangles.
-#[inline(always)]
-fn primitives(chunk: Chunk<'_>) -> &[u32] {
-    &bytemuck::cast_ref::<[i32; SIFTED], [u32; SIFTED]>(chunk.ids())[..chunk.count().min(SIFTED)]
-}
-
 impl Ground for OfBoxes<'_> {
-    const FEW: u32 = 2;
+    const FEW: u32 = FEW;
+    const SHEARS: bool = true;
+    const FETCHES: bool = false;
 
     #[inline(always)]
     fn is_leaf(&self, place: i32) -> bool {
@@ -165,20 +202,28 @@ impl Ground for OfBoxes<'_> {
     }
 
     #[inline(always)]
-    fn leaf<'a>(&'a self, list: &'a List) -> impl Iterator<Item = &'a [u32]> + Clone {
-        self.chunks(list).map(primitives)
+    fn fetch_triangles<R>(&self, _: &Resident<'_, R>, _: &List) {}
+
+    #[inline(always)]
+    fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
+        &self,
+        _: &Resident<'_, M::Record>,
+        Rays { lot, candidates, seen }: &mut Rays,
+        entries: &Entries,
+        list: &List,
+    ) {
+        pool::meet::<W, L, M, ANY>(lot, entries, list, self.chunks(list), candidates, seen);
     }
 
     #[inline(always)]
-    fn test_few<L: Sixteen, M: Mode, const ANY: bool>(
+    fn meet_few<L: Sixteen, M: Mode, const ANY: bool>(
         &self,
-        resident: &Resident<'_, M::Record>,
-        lot: &mut Lot,
+        Rays { lot, candidates, .. }: &mut Rays,
         entries: &Entries,
         list: &List,
     ) {
         for at in list.at..list.at + list.len {
-            pool::test_one::<L, M, ANY>(resident, lot, entries, at as usize, self.chunks(list));
+            pool::meet_one::<L, M, ANY>(lot, entries, at as usize, self.chunks(list), candidates);
         }
     }
 }

@@ -1,24 +1,24 @@
 //! A lot of rays: where each starts, how it runs, and what it has found.
 
-use super::source::Source;
-use crate::geometry::triangle::pooled::Pooled;
-use crate::geometry::{Aabb, Ray};
+use crate::geometry::Aabb;
+use crate::geometry::triangle::pooled::{Listed, Pooled, shears};
 use crate::kdtree::Line;
 use crate::simd::{Dense, Eight, Lanes, Mask};
 use crate::traverse::closest::{Closest, NONE};
+use crate::traverse::columns::rows;
 use crate::traverse::kernel::Kernel;
 use crate::traverse::pool::step::Slabs;
 use crate::traverse::ready::Ready;
+use crate::traverse::source::Source;
 use crate::traverse::stream::step::Planes;
-use crate::traverse::walk::{MARGIN, load3};
-use glam::Vec3;
+use crate::traverse::walk::MARGIN;
 use std::ops::Range;
-
-/// What stands where there is no ray.
-const NOTHING: Ray = Ray::new(Vec3::ZERO, Vec3::ZERO);
 
 /// Rays in a lot.
 pub const LOT: usize = Kernel::Filter.width();
+
+/// A ray's id is its number in the lot, and of a sheared ray the greatest axis of its direction as well, so many times over.
+const AXIS: i32 = LOT as i32;
 
 /// A ray on its way, in half a cache line.
 #[derive(Clone, Copy)]
@@ -44,12 +44,12 @@ pub struct Crossing<L> {
 /// The rays.
 pub struct Lot {
     travellers: [Traveller; LOT],
-    /// Their directions, and `tnear`.
+    /// Their directions, or [shears], and `tnear`.
     ways: [[f32; 4]; LOT],
     /// Where each ray is inside the scene's bounds.
     pub tmin: [f32; LOT],
     pub tmax: [f32; LOT],
-    /// The rays that run into each octant, and how many these are. Bit 0 of an octant's number says that they run down
+    /// The ids of the rays that run into each octant, and how many these are. Bit 0 of an octant's number says that they run down
     /// along x.
     octants: [[i32; LOT]; 8],
     counts: [usize; 8],
@@ -78,20 +78,26 @@ impl Lot {
     pub fn leave(&mut self, rays: Source<'_>, eights: Range<usize>) {
         let places = 8 * eights.len();
         for (of_lot, eight) in eights.enumerate() {
-            self.odd[of_lot] = rays.eight(eight).1 as u8;
+            self.odd[of_lot] = rays.present(eight) as u8;
         }
         for traveller in &mut self.travellers[..places] {
             traveller.inverse[3] = f32::from_bits(NONE as u32);
         }
     }
 
-    /// Makes the rays of up to [`LOT`] places ready, those of some eights.
+    /// Makes the rays of up to [`LOT`] places ready, those of some eights. With `SHEARS`, shears are kept of them in place of
+    /// directions.
     #[inline(always)]
-    pub fn prepare<L: Eight>(&mut self, rays: Source<'_>, eights: Range<usize>, bounds: &Aabb) {
+    pub fn prepare<L: Eight, const SHEARS: bool>(
+        &mut self,
+        rays: Source<'_>,
+        eights: Range<usize>,
+        bounds: &Aabb,
+    ) {
         self.counts = [0; 8];
         let mut greatest_reach = L::splat(0.0);
         for (of_lot, eight) in eights.enumerate() {
-            let reach = self.prepare_eight::<L>(rays, eight, of_lot % (LOT / 8), bounds);
+            let reach = self.prepare_eight::<L, SHEARS>(rays, eight, of_lot % (LOT / 8), bounds);
             greatest_reach = reach.max(greatest_reach);
         }
         self.thickness = greatest_reach.greatest() * MARGIN;
@@ -99,53 +105,61 @@ impl Lot {
 
     /// Eight of them, to be the lot's number `of_lot`; how far the scene reaches from each of those that meet it.
     #[inline(always)]
-    fn prepare_eight<L: Eight>(&mut self, rays: Source<'_>, eight: usize, of_lot: usize, bounds: &Aabb) -> L {
-        let (packet, present) = rays.eight(eight);
-        let (origin, direction) = (load3::<8, L>(&packet.origin), load3::<8, L>(&packet.direction));
-        let (tnear, tfar) = (L::load(&packet.tnear), L::load(&packet.tfar));
+    fn prepare_eight<L: Eight, const SHEARS: bool>(
+        &mut self,
+        rays: Source<'_>,
+        eight: usize,
+        of_lot: usize,
+        bounds: &Aabb,
+    ) -> L {
+        let ([[x, y, z, tnear], [dx, dy, dz, tfar]], present) = rays.eight::<L>(eight);
+        let (origin, direction) = ([x, y, z], [dx, dy, dz]);
         let Ready { inverse, reach, tmin, tmax, closest, ordinary, flies, .. } =
             Ready::new(&origin, &direction, tnear, tfar, bounds);
         self.odd[of_lot] = (!ordinary & present) as u8;
         let place = 8 * of_lot;
-        *self.tmin[place..].first_chunk_mut().expect("eights fill the lot") = tmin.store();
-        *self.tmax[place..].first_chunk_mut().expect("eights fill the lot") = tmax.store();
+        let room = "eights fill the lot";
+        *self.tmin[place..].first_chunk_mut().expect(room) = tmin.store();
+        *self.tmax[place..].first_chunk_mut().expect(room) = tmax.store();
+
+        // (Where there is no ray, nobody looks for anything.)
+        let nothing = L::splat(f32::from_bits(NONE as u32));
+        let starts = rows([x, y, z, closest]);
+        let inverses = rows([inverse[0], inverse[1], inverse[2], nothing]);
+        for (lane, traveller) in self.travellers[place..].iter_mut().take(8).enumerate() {
+            *traveller = Traveller { start: starts[lane], inverse: inverses[lane] };
+        }
+        let ([wx, wy, wz], [is_x, is_y]) =
+            if SHEARS { shears(&origin, &direction) } else { (direction, [0xff, 0]) };
+        *self.ways[place..].first_chunk_mut().expect(room) = rows([wx, wy, wz, tnear]);
 
         let zero = L::splat(0.0);
-        let mut down = [0; 3];
-        for axis in 0..3 {
-            down[axis] = inverse[axis].lt(zero).bits();
-        }
-        let closest = closest.store();
-        let inverse = [inverse[0].store(), inverse[1].store(), inverse[2].store()];
-        let mut start = |lane: usize, ray: &Ray| {
-            self.travellers[place + lane] = Traveller {
-                start: [ray.origin.x, ray.origin.y, ray.origin.z, closest[lane]],
-                inverse: [inverse[0][lane], inverse[1][lane], inverse[2][lane], f32::from_bits(NONE as u32)],
-            };
-            self.ways[place + lane] = [ray.direction.x, ray.direction.y, ray.direction.z, ray.tnear];
-        };
-        if let Some(row) = rays.row(eight) {
-            row.iter().enumerate().for_each(|(lane, ray)| start(lane, ray));
-        } else {
-            // Where there is no ray, one of an earlier lot may have found something: what is put there looks for nothing.
-            for lane in 0..8 {
-                start(lane, &if present >> lane & 1 == 1 { rays.ray(8 * eight + lane) } else { NOTHING });
-            }
-        }
+        let down = [inverse[0].lt(zero).bits(), inverse[1].lt(zero).bits(), inverse[2].lt(zero).bits()];
         let mut left = flies & present;
         while left != 0 {
             let lane = left.trailing_zeros() as usize & 7;
             left &= left - 1;
             let octant =
                 (down[0] >> lane & 1 | (down[1] >> lane & 1) << 1 | (down[2] >> lane & 1) << 2) as usize;
+            let axis = match (is_x >> lane & 1, is_y >> lane & 1) {
+                (1, _) => 0,
+                (_, 1) => AXIS,
+                _ => 2 * AXIS,
+            };
             let count = &mut self.counts[octant];
-            self.octants[octant][*count % LOT] = (place + lane) as i32;
+            self.octants[octant][*count % LOT] = (place + lane) as i32 + axis;
             *count += 1;
         }
         L::select(L::mask_from_bits(flies & present), reach, zero)
     }
 
-    /// The rays that run into an octant.
+    /// A ray's number in the lot.
+    #[inline(always)]
+    pub fn place(id: i32) -> usize {
+        id as usize % LOT
+    }
+
+    /// The ids of the rays that run into an octant.
     #[inline(always)]
     pub fn octant(&self, octant: usize) -> &[i32] {
         &self.octants[octant][..self.counts[octant]]
@@ -188,21 +202,43 @@ impl Lot {
         (Slabs::new(&[x, y, z], &inverse, &margin), closest)
     }
 
-    /// A ray that ends where a hit must not lie beyond, and the closest triangle's id, or [`NONE`].
+    /// How far the scene reaches from any of the rays.
     #[inline(always)]
-    pub fn ray(&self, id: i32) -> (Ray, i32) {
-        let id = id as usize % LOT;
-        let Traveller { start: [x, y, z, closest], inverse: [.., primitive] } = self.travellers[id];
-        let [dx, dy, dz, tnear] = self.ways[id];
-        let ray = Ray { origin: Vec3::new(x, y, z), direction: Vec3::new(dx, dy, dz), tnear, tfar: closest };
-        (ray, primitive.to_bits() as i32)
+    fn reach(&self) -> f32 {
+        self.thickness / MARGIN
     }
 
-    /// A ray of the lot as pools see it.
+    /// A sheared ray as pools see it, and between which ends it looks for hits.
     #[inline(always)]
-    pub fn pooled(&self, ray: &Ray) -> Pooled {
-        // How far the scene reaches from any of them.
-        Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), self.thickness / MARGIN)
+    pub fn pooled(&self, id: i32) -> (Pooled, [f32; 2]) {
+        let place = id as usize % LOT;
+        let Traveller { start: [x, y, z, closest], .. } = self.travellers[place];
+        let [sx, sy, scale, tnear] = self.ways[place];
+        let axis = (id / AXIS) as usize;
+        (Pooled::of_shear(&[x, y, z], [sx, sy, scale], axis, self.reach()), [tnear, closest])
+    }
+
+    /// Sheared rays likewise.
+    #[inline(always)]
+    pub fn listed<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> (Listed<W, L>, [L; 2]) {
+        let nowhere = &[0.0; 4];
+        let (mut starts, mut ways) = ([nowhere; W], [nowhere; W]);
+        for lane in 0..W {
+            let place = ids[lane] as usize % LOT;
+            (starts[lane], ways[lane]) = (&self.travellers[place].start, &self.ways[place]);
+        }
+        let [x, y, z, closest] = L::columns(&starts);
+        let [sx, sy, scale, tnear] = L::columns(&ways);
+        let ids = L::ids_of(ids);
+        let axes = [L::ids_less(ids, L::ids(AXIS)), L::ids_less(ids, L::ids(2 * AXIS))];
+        (Listed::new(&[x, y, z], [sx, sy, scale], axes, self.reach()), [tnear, closest])
+    }
+
+    /// What a ray has found: what a hit must not lie beyond, and a triangle's id, or [`NONE`].
+    #[inline(always)]
+    pub fn found_by(&self, id: i32) -> (f32, i32) {
+        let traveller = &self.travellers[id as usize % LOT];
+        (traveller.start[3], traveller.inverse[3].to_bits() as i32)
     }
 
     /// Keeps what a ray has found.
@@ -228,7 +264,7 @@ impl Lot {
         (Closest::of_found(closest, L::ids_of(&primitives)), [x, y, z])
     }
 
-    /// Rays' directions, and `tnear`.
+    /// Rays' directions, or their shears, and `tnear`.
     #[inline(always)]
     pub fn ways<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> [L; 4] {
         let mut ways = [&[0.0; 4]; W];
@@ -248,17 +284,29 @@ impl Lot {
 
     /// Keeps what those of some rays have found whose bits are set.
     #[inline(always)]
-    pub fn keep<const W: usize, L: Lanes<W>>(
+    pub fn keep<const W: usize, L: Lanes<W>>(&mut self, ids: &[i32; W], bits: u32, found: &Closest<W, L>) {
+        let (t, primitives) = (found.t.store(), found.primitives());
+        self.keep_each(
+            ids,
+            bits,
+            #[inline(always)]
+            |lane| (t[lane], primitives[lane]),
+        );
+    }
+
+    /// The same of what `found` gives for their lanes.
+    #[inline(always)]
+    pub fn keep_each<const W: usize>(
         &mut self,
         ids: &[i32; W],
         mut bits: u32,
-        found: &Closest<W, L>,
+        found: impl Fn(usize) -> (f32, i32),
     ) {
-        let (t, primitives) = (found.t.store(), found.primitives());
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize % W;
             bits &= bits - 1;
-            self.keep_one(ids[lane], t[lane], primitives[lane]);
+            let (t, primitive) = found(lane);
+            self.keep_one(ids[lane], t, primitive);
         }
     }
 

@@ -26,61 +26,50 @@
 
 mod accel;
 mod boxes;
+mod candidates;
 mod cut;
 mod ground;
 mod leaf;
 mod lists;
 mod lot;
 mod pool;
-mod source;
 
-use super::closest::{Closest, Normals};
+use super::closest::Closest;
+use super::pool::answers::{Pairs, Told};
 use super::records::Resident;
-use super::stream::{self, Answers};
-use super::walk::load3;
-use crate::geometry::triangle::{Mode, Test};
+use super::source::Source;
+use super::stream;
+use crate::geometry::Hit;
+use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
 use crate::simd::{Eight, Simd};
-use ground::Ground;
+use candidates::Candidates;
+use ground::{Ground, Rays};
 use lists::{Entries, Heads};
 use lot::{LOT, Lot};
-use source::Source;
+use pool::Seen;
 use std::cell::Cell;
 use std::ops::Range;
 
 /// What is asked of each ray, eight answers at a time.
-pub trait ByEights: Answers {
-    /// What the rays in the places from number `8 * eight` on have found.
-    fn found_by_eight<L: Eight, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        eight: usize,
-        closest: &Closest<8, L>,
-    );
+pub trait ByEights: Told {
+    /// Gives the answers of the rays in the places from number `8 * eight` on, as far as they are known: closest hits are told
+    /// afterwards.
+    fn give<L: Eight>(&mut self, eight: usize, found: &Closest<8, L>);
 }
 
 impl ByEights for stream::Closest<'_> {
     #[inline(always)]
-    fn found_by_eight<L: Eight, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        eight: usize,
-        closest: &Closest<8, L>,
-    ) {
-        let (rays, _) = rays.eight(eight);
-        let test = M::Test::<8, L>::new(&load3(&rays.origin), &load3(&rays.direction), closest.found());
-        let found = closest.records::<Resident<'_, M::Record>, M>(tree, Some(&test), &mut Normals::new());
-        for (lane, hit) in self.0[8 * eight..].iter_mut().take(8).enumerate() {
-            *hit = found.get(lane);
+    fn give<L: Eight>(&mut self, eight: usize, _: &Closest<8, L>) {
+        for hit in self.0[8 * eight..].iter_mut().take(8) {
+            *hit = Hit::MISS;
         }
     }
 }
 
 /// What a worker's lots need, too large to be made anew for each call.
 struct Room {
-    lot: Lot,
+    rays: Rays,
     entries: Entries,
     /// The lists of each octant.
     heads: [Heads; 8],
@@ -101,47 +90,67 @@ fn trace<S: Simd, M: Mode, G: Ground, A: ByEights>(
     // Taken out, not borrowed: a closure would be compiled without the instruction set.
     let mut boxed = match ROOM.take() {
         Some(room) => room,
-        None => {
-            Box::new(Room { lot: Lot::new(), entries: Entries::new(), heads: [const { Heads::new() }; 8] })
-        }
+        None => Box::new(Room {
+            rays: Rays { lot: Lot::new(), candidates: Candidates::default(), seen: Seen::NOTHING },
+            entries: Entries::new(),
+            heads: [const { Heads::new() }; 8],
+        }),
     };
     let room = &mut *boxed;
+    let mut pairs = Pairs::NONE;
     let is_scaled = !resident.scale().is_none();
     let eights = rays.places().div_ceil(8);
     for first in (0..eights).step_by(LOT / 8) {
         let eights = first..eights.min(first + LOT / 8);
         if is_scaled {
-            room.lot.leave(rays, eights.clone());
+            room.rays.lot.leave(rays, eights.clone());
         } else {
-            room.lot.prepare::<S::F8>(rays, eights.clone(), resident.bounds());
-            if A::ANY {
-                walk::<S, M, G, true>(resident, ground, room);
+            if G::SHEARS {
+                room.rays.lot.prepare::<S::F8, true>(rays, eights.clone(), resident.bounds());
             } else {
-                walk::<S, M, G, false>(resident, ground, room);
+                room.rays.lot.prepare::<S::F8, false>(rays, eights.clone(), resident.bounds());
+            }
+            let at = At { resident, rays, place: 8 * first };
+            if A::ANY {
+                walk::<S, M, G, true>(&at, ground, room);
+            } else {
+                walk::<S, M, G, false>(&at, ground, room);
             }
         }
-        give::<S, M, A>(resident, rays, eights, &room.lot, answers);
+        give::<S, M, A>(resident, rays, eights, &mut room.rays, &mut pairs, answers);
     }
+    answers.finish::<S, M>(resident, rays, &mut pairs);
     ROOM.set(Some(boxed));
+}
+
+/// Where a lot is: the tree, all rays, and the place of the lot's first.
+struct At<'a, R> {
+    resident: &'a Resident<'a, R>,
+    rays: Source<'a>,
+    place: usize,
+}
+
+impl Rays {
+    /// Asks the mode's own test of all that may be hit.
+    fn settle<M: Mode, const ANY: bool>(&mut self, at: &At<'_, M::Record>) {
+        self.candidates.settle::<M, ANY>(at.resident, at.rays, at.place, &mut self.lot);
+    }
 }
 
 /// Walks the tree with the rays of a lot.
 ///
 /// Octants take turns, a list each, so that what a list needs of memory can be fetched while the others have theirs.
 #[inline(always)]
-fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(
-    resident: &Resident<'_, M::Record>,
-    ground: &G,
-    room: &mut Room,
-) {
-    let Room { lot, entries, heads } = room;
+fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, ground: &G, room: &mut Room) {
+    let Room { rays, entries, heads } = room;
+    let resident = at.resident;
     let (mut waiting, mut fetched) = (0u32, 0u32);
-    let mut at = 0;
+    let mut begin = 0;
     for octant in 0..8 {
-        let rays = lot.octant(octant);
-        heads[octant].push(0, at, rays.len());
-        at = entries.begin(rays, lot, at);
-        waiting |= u32::from(!rays.is_empty()) << octant;
+        let ids = rays.lot.octant(octant);
+        heads[octant].push(0, begin, ids.len());
+        begin = entries.begin(ids, &rays.lot, begin);
+        waiting |= u32::from(!ids.is_empty()) << octant;
     }
     while waiting != 0 {
         let mut turn = waiting;
@@ -156,6 +165,7 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(
             // Sixteen lanes for lists that fill more than half of them.
             let wide = S::NATIVE == 16 && list.len > 8;
             if !ground.is_leaf(list.exit) {
+                let lot = &rays.lot;
                 if list.len == 1 {
                     ground.take_one::<S::F8>(lot, entries, heads, &list);
                 } else if wide {
@@ -164,44 +174,62 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(
                     ground.cut::<8, S::F8, S::F8>(octant, lot, entries, heads, &list);
                 }
                 ground.fetch(heads.top());
-            } else if fetched >> octant & 1 == 0 {
-                if list.len > G::FEW {
-                    leaf::fetch(resident, ground.leaf(&list));
-                }
+            } else if G::FETCHES && fetched >> octant & 1 == 0 {
+                ground.fetch_triangles(resident, &list);
                 heads.keep();
                 fetched |= 1 << octant;
             } else {
                 if list.len <= G::FEW {
-                    ground.test_few::<S::F16, M, ANY>(resident, lot, entries, &list);
+                    ground.meet_few::<S::F16, M, ANY>(rays, entries, &list);
                 } else if wide {
-                    leaf::test::<16, S::F16, M, ANY>(resident, lot, entries, &list, ground.leaf(&list));
+                    ground.meet::<16, S::F16, M, ANY>(resident, rays, entries, &list);
                 } else {
-                    leaf::test::<8, S::F8, M, ANY>(resident, lot, entries, &list, ground.leaf(&list));
+                    ground.meet::<8, S::F8, M, ANY>(resident, rays, entries, &list);
                 }
                 ground.fetch(heads.top());
                 fetched &= !(1 << octant);
+                if rays.candidates.are_many() {
+                    rays.settle::<M, ANY>(at);
+                }
             }
         }
     }
 }
 
-/// Gives the answers of a lot's rays, those of some eights.
+/// Gives the answers of a lot's rays, those of some eights, but for pairs of rays and triangles that wait.
 #[inline(always)]
 fn give<S: Simd, M: Mode, A: ByEights>(
     resident: &Resident<'_, M::Record>,
     rays: Source<'_>,
     eights: Range<usize>,
-    lot: &Lot,
+    Rays { lot, candidates, .. }: &mut Rays,
+    pairs: &mut Pairs,
     answers: &mut A,
 ) {
+    let place = 8 * eights.start;
     for (of_lot, eight) in eights.enumerate() {
-        answers.found_by_eight::<S::F8, M>(resident, rays, eight, &lot.closest::<S::F8>(of_lot));
+        let closest = lot.closest::<S::F8>(of_lot);
+        answers.give(eight, &closest);
+        let mut found = if A::ANY { 0 } else { closest.found() & 0xff };
+        let primitives = closest.primitives();
+        while found != 0 {
+            let lane = found.trailing_zeros() as usize & 7;
+            found &= found - 1;
+            if pairs.put_one(8 * eight + lane, primitives[lane], resident.tree.triangles()) {
+                answers.answer::<S, M>(resident, rays, pairs);
+            }
+        }
         let mut odd = lot.odd(of_lot);
         while odd != 0 {
             let lane = odd.trailing_zeros() as usize & 7;
             odd &= odd - 1;
             let place = 8 * eight + lane;
             answers.odd::<M>(resident, place, &rays.ray(place));
+        }
+    }
+    for (id, primitive) in candidates.take(lot) {
+        if pairs.put_one(place + Lot::place(id), primitive, resident.tree.triangles()) {
+            answers.answer::<S, M>(resident, rays, pairs);
         }
     }
 }

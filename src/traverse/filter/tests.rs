@@ -3,12 +3,12 @@
 use super::ground::{Ground, OfBoxes, OfLines};
 use super::lists::{Entries, Heads, List};
 use super::lot::{LOT, Lot};
-use super::source::Source;
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, Exit, Tree};
 use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, Task};
 use crate::traverse::pool::ways::Ways;
+use crate::traverse::source::Source;
 use crate::traverse::{Accel, Kernel, RayPacket};
 use glam::Vec3;
 use std::collections::HashSet;
@@ -79,7 +79,8 @@ impl Cuts<'_> {
     ) -> Vec<[Waiting; 3]> {
         let Self(accel, rays, kind) = self;
         let mut lot = Box::new(Lot::new());
-        lot.prepare::<S::F8>(Source::Slice(rays), 0..rays.len().div_ceil(8), accel.tree().bounds());
+        let eights = 0..rays.len().div_ceil(8);
+        lot.prepare::<S::F8, false>(Source::Slice(rays), eights, accel.tree().bounds());
         let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
         for octant in 0..8 {
             let ids = lot.octant(octant);

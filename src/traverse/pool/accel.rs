@@ -1,6 +1,6 @@
 //! Rays through the pools of an [`Accel`].
 
-use super::{Told, alone, trace};
+use super::{OfFlights, alone, trace};
 use crate::error::{Error, Result};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Accuracy, Hit, Ray};
@@ -79,7 +79,7 @@ struct InPools<'a, A> {
     answers: A,
 }
 
-impl<A: Told> ResidentQuery for InPools<'_, A> {
+impl<A: OfFlights> ResidentQuery for InPools<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         // Rays have numbers of 32 bits.
@@ -93,7 +93,7 @@ struct Alone<'a, A> {
     answers: A,
 }
 
-impl<A: Told> ResidentQuery for Alone<'_, A> {
+impl<A: OfFlights> ResidentQuery for Alone<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         alone::trace::<S, M, A>(tree, self.pools, self.ray, &mut self.answers);

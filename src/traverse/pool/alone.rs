@@ -4,7 +4,7 @@
 //! few steps there are, and boxes make them few. In the end the mode's own test is asked of the one or two triangles that
 //! are left on its list, one by one.
 
-use super::answers::Told;
+use super::answers::OfFlights;
 use super::flight::{Finds, Flight};
 use super::step::{Slabs, step};
 use crate::geometry::Ray;
@@ -18,7 +18,7 @@ use crate::traverse::stream::with_stacks;
 
 /// Traces a ray, and gives an answer for ray 0.
 #[inline(always)]
-pub fn trace<S: Simd, M: Mode, A: Told>(
+pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     resident: &Resident<'_, M::Record>,
     pools: &Pools,
     ray: &Ray,
@@ -49,7 +49,7 @@ pub fn trace<S: Simd, M: Mode, A: Told>(
 
 /// Goes all the way, and lists what may be hit. Says whether anything is for certain, where that is enough.
 #[inline(always)]
-fn walk<S: Simd, M: Mode, A: Told>(
+fn walk<S: Simd, M: Mode, A: OfFlights>(
     resident: &Resident<'_, M::Record>,
     pools: &Pools,
     ray: &Ray,

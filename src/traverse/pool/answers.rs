@@ -10,7 +10,8 @@ use crate::geometry::{Hit, Ray};
 use crate::kdtree::{MOST, Tree};
 use crate::simd::{Lanes, Simd, Sixteen, prefetch_both};
 use crate::traverse::records::Resident;
-use crate::traverse::stream::{Any, Closest, OneByOne};
+use crate::traverse::source::Source;
+use crate::traverse::stream::{Answers, Any, Closest, OneByOne};
 
 /// Triangles that wait, and the ray of each.
 pub struct Pairs {
@@ -37,6 +38,16 @@ impl Pairs {
         }
     }
 
+    /// Puts one there, and fetches its record. Says whether enough wait to be answered.
+    #[inline(always)]
+    pub fn put_one(&mut self, ray: usize, primitive: i32, records: &[Triangle]) -> bool {
+        let place = self.count.min(ROOM);
+        (self.rays[place], self.primitives[place]) = (ray as u32, primitive);
+        prefetch_both(records.as_ptr().wrapping_add(primitive as usize));
+        self.count = place + 1;
+        self.count > ROOM
+    }
+
     /// Takes out the first sixteen.
     #[inline(always)]
     fn shift(&mut self) {
@@ -52,55 +63,59 @@ pub struct Met16<L: Sixteen> {
     corners: [[L; 3]; 3],
 }
 
-/// Where rays' answers go.
-pub trait Told: OneByOne {
-    /// A ray hits something for certain, of any.
-    fn hits(&mut self, ray: usize);
+impl<L: Sixteen> Met16<L> {
+    /// The rays that hit their triangles, of the first `count` that wait.
+    #[inline(always)]
+    pub fn rays<M: Mode>(
+        &self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &Pairs,
+        count: usize,
+    ) -> impl Iterator<Item = usize> {
+        let Own { mut hits, open, .. } = self.own;
+        let mut open = open & ((1 << count) - 1);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % 16;
+            open &= open - 1;
+            let (ray, primitive) = (rays.ray(pairs.rays[lane] as usize), pairs.primitives[lane] as u32);
+            hits |= u32::from(hit_of_one::<M>(tree, &ray, primitive).is_hit()) << lane;
+        }
+        (0..count).filter(move |lane| hits >> lane & 1 == 1).map(|lane| pairs.rays[lane] as usize)
+    }
+}
 
+/// Where the answers of rays go that may hit some triangles.
+pub trait Told: Answers {
     /// Takes up what rays found of a triangle each, of the first `count` that wait.
     fn tell<S: Simd, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
-        rays: &[Ray],
+        rays: Source<'_>,
         pairs: &Pairs,
         count: usize,
         found: &Met16<S::F16>,
     );
 
-    /// A ray has ended.
-    #[inline(always)]
-    fn end<S: Simd, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: &[Ray],
-        flight: &Flight,
-        pairs: &mut Pairs,
-    ) {
-        self.missed(flight.ray as usize);
-        pairs.put::<S::F16>(flight, tree.tree.triangles());
-        while pairs.count > ROOM {
-            self.answer::<S, M>(tree, rays, pairs);
-        }
-    }
-
-    /// Answers a ray that has ended and is alone.
-    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight);
-
     /// Answers the first sixteen that wait.
     #[inline(always)]
-    fn answer<S: Simd, M: Mode>(&mut self, tree: &Resident<'_, M::Record>, rays: &[Ray], pairs: &mut Pairs) {
+    fn answer<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &mut Pairs,
+    ) {
         let triangles = tree.tree.triangles();
         let nowhere = &[0.0; 4];
-        let (mut starts, mut ways) = ([nowhere; 16], [nowhere; 16]);
+        let (mut starts, mut ways) = ([[0.0; 4]; 16], [[0.0; 4]; 16]);
         let mut fours = [[nowhere; 16]; 3];
         for lane in 0..16 {
-            let [start, way]: &[[f32; 4]; 2] = bytemuck::cast_ref(&rays[pairs.rays[lane] as usize]);
-            (starts[lane], ways[lane]) = (start, way);
+            [starts[lane], ways[lane]] = rays.rows(pairs.rays[lane] as usize);
             let [a, b, c] = triangles[pairs.primitives[lane] as usize].fours();
             (fours[0][lane], fours[1][lane], fours[2][lane]) = (a, b, c);
         }
-        let [ox, oy, oz, tnear] = S::F16::of_fours(&starts);
-        let [dx, dy, dz, tfar] = S::F16::of_fours(&ways);
+        let [ox, oy, oz, tnear] = S::F16::of_fours(&starts.each_ref());
+        let [dx, dy, dz, tfar] = S::F16::of_fours(&ways.each_ref());
         let [ax, ay, az, bx] = S::F16::of_fours(&fours[0]);
         let [by, bz, cx, cy] = S::F16::of_fours(&fours[1]);
         let [cz, nx, ny, nz] = S::F16::of_fours(&fours[2]);
@@ -115,7 +130,12 @@ pub trait Told: OneByOne {
 
     /// Answers all that wait.
     #[inline(always)]
-    fn finish<S: Simd, M: Mode>(&mut self, tree: &Resident<'_, M::Record>, rays: &[Ray], pairs: &mut Pairs) {
+    fn finish<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &mut Pairs,
+    ) {
         while pairs.count > 0 {
             for place in pairs.count..16 {
                 (pairs.rays[place], pairs.primitives[place]) = (pairs.rays[0], pairs.primitives[0]);
@@ -125,15 +145,37 @@ pub trait Told: OneByOne {
     }
 }
 
-impl Told for Closest<'_> {
-    #[inline(always)]
-    fn hits(&mut self, _ray: usize) {}
+/// Where the answers of rays in flight go.
+pub trait OfFlights: Told + OneByOne {
+    /// A ray hits something for certain, of any.
+    fn hits(&mut self, ray: usize);
 
+    /// A ray has ended.
+    #[inline(always)]
+    fn end<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        flight: &Flight,
+        pairs: &mut Pairs,
+    ) {
+        self.missed(flight.ray as usize);
+        pairs.put::<S::F16>(flight, tree.tree.triangles());
+        while pairs.count > ROOM {
+            self.answer::<S, M>(tree, rays, pairs);
+        }
+    }
+
+    /// Answers a ray that has ended and is alone.
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight);
+}
+
+impl Told for Closest<'_> {
     #[inline(always)]
     fn tell<S: Simd, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
-        rays: &[Ray],
+        rays: Source<'_>,
         pairs: &Pairs,
         count: usize,
         Met16 { own, corners: [a, b, c] }: &Met16<S::F16>,
@@ -161,9 +203,17 @@ impl Told for Closest<'_> {
             let lane = open.trailing_zeros() as usize % 16;
             open &= open - 1;
             let ray = pairs.rays[lane] as usize;
-            take_nearer(&mut self.0[ray], hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32));
+            take_nearer(
+                &mut self.0[ray],
+                hit_of_one::<M>(tree, &rays.ray(ray), pairs.primitives[lane] as u32),
+            );
         }
     }
+}
+
+impl OfFlights for Closest<'_> {
+    #[inline(always)]
+    fn hits(&mut self, _ray: usize) {}
 
     #[inline(always)]
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
@@ -209,25 +259,24 @@ fn hit_of<M: Mode>(tree: &Resident<'_, M::Record>, primitive: u32, candidate: &C
 
 impl Told for Any<'_> {
     #[inline(always)]
-    fn hits(&mut self, ray: usize) {
-        self.0[ray] = true;
-    }
-
-    #[inline(always)]
     fn tell<S: Simd, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
-        rays: &[Ray],
+        rays: Source<'_>,
         pairs: &Pairs,
         count: usize,
         found: &Met16<S::F16>,
     ) {
-        for lane in 0..count {
-            let ray = pairs.rays[lane] as usize;
-            let is_open = found.own.open >> lane & 1 == 1;
-            self.0[ray] |= found.own.hits >> lane & 1 == 1
-                || is_open && hit_of_one::<M>(tree, &rays[ray], pairs.primitives[lane] as u32).is_hit();
+        for ray in found.rays::<M>(tree, rays, pairs, count) {
+            self.0[ray] = true;
         }
+    }
+}
+
+impl OfFlights for Any<'_> {
+    #[inline(always)]
+    fn hits(&mut self, ray: usize) {
+        self.0[ray] = true;
     }
 
     #[inline(always)]

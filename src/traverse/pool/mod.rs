@@ -19,20 +19,21 @@
 
 mod accel;
 mod alone;
-mod answers;
+pub mod answers;
 mod flight;
 mod start;
 pub mod step;
 pub mod ways;
 
 use super::records::Resident;
+use super::source::Source;
 use super::stream::step::{END, Waiting};
 use super::stream::{IN_FLIGHT, Set, with_stacks};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
 use crate::kdtree::{Pools, Tree, Way};
 use crate::simd::Simd;
-use answers::{Pairs, Told};
+use answers::{OfFlights, Pairs};
 use flight::{Finds, Flight};
 use start::Starts;
 use step::step;
@@ -40,7 +41,7 @@ use ways::Ways;
 
 /// Traces rays and gives an answer for each.
 #[inline(always)]
-fn trace<S: Simd, M: Mode, A: Told>(
+fn trace<S: Simd, M: Mode, A: OfFlights>(
     resident: &Resident<'_, M::Record>,
     pools: &Pools,
     rays: &[Ray],
@@ -53,7 +54,7 @@ fn trace<S: Simd, M: Mode, A: Told>(
 }
 
 #[inline(always)]
-fn fly<S: Simd, M: Mode, A: Told>(
+fn fly<S: Simd, M: Mode, A: OfFlights>(
     resident: &Resident<'_, M::Record>,
     pools: &Pools,
     rays: &[Ray],
@@ -95,7 +96,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
             ahead += eight.len();
         }
         if free == Set::ALL {
-            answers.finish::<S, M>(resident, rays, &mut pairs);
+            answers.finish::<S, M>(resident, Source::Slice(rays), &mut pairs);
             return;
         }
 
@@ -106,7 +107,7 @@ fn fly<S: Simd, M: Mode, A: Told>(
             let top = flight.top as usize;
             let way = Way(waiting.exits[top]);
             if way.0 == END {
-                answers.end::<S, M>(resident, rays, flight, &mut pairs);
+                answers.end::<S, M>(resident, Source::Slice(rays), flight, &mut pairs);
                 free.put_if(k, true);
                 continue;
             }

@@ -3,6 +3,7 @@
 use super::step::{Slabs, thick};
 use crate::geometry::{Aabb, Ray};
 use crate::simd::{Eight, Mask};
+use crate::traverse::columns::columns;
 use crate::traverse::ready::Ready;
 
 /// Eight rays about to start, number by number.
@@ -24,7 +25,7 @@ impl Starts {
     #[inline(always)]
     pub fn new<L: Eight>(rays: &[Ray], bounds: &Aabb) -> Self {
         let present = (1u32 << rays.len().min(8)) - 1;
-        let ([x, y, z, tnear], [dx, dy, dz, tfar]) = columns::<L>(rays);
+        let [[x, y, z, tnear], [dx, dy, dz, tfar]] = columns::<L>(rays);
         let origin = [x, y, z];
         let Ready { inverse, reach, margin, closest, ordinary, flies, .. } =
             Ready::new(&origin, &[dx, dy, dz], tnear, tfar, bounds);
@@ -66,29 +67,4 @@ impl Starts {
     pub fn reach_and_tfar(&self, lane: usize) -> [f32; 2] {
         [self.reach[lane], self.tfar[lane]]
     }
-}
-
-/// Up to eight rays, number by number: origins and `tnear`, directions and `tfar`. Lanes without a ray hold the first one.
-#[inline(always)]
-fn columns<L: Eight>(rays: &[Ray]) -> ([L; 4], [L; 4]) {
-    let nowhere = &[0.0; 4];
-    let (mut starts, mut ways) = ([nowhere; 8], [nowhere; 8]);
-    for lane in 0..8 {
-        if let Some(ray) = rays.get(lane).or(rays.first()) {
-            let [start, way]: &[[f32; 4]; 2] = bytemuck::cast_ref(ray);
-            (starts[lane], ways[lane]) = (start, way);
-        }
-    }
-    (turned(&starts), turned(&ways))
-}
-
-/// Rows and columns exchanged: lane `j` of vector `i` is number `i` of `fours[j]`.
-#[inline(always)]
-fn turned<L: Eight>(fours: &[&[f32; 4]; 8]) -> [L; 4] {
-    L::transpose_fours([
-        L::of_fours([fours[0], fours[4]]),
-        L::of_fours([fours[1], fours[5]]),
-        L::of_fours([fours[2], fours[6]]),
-        L::of_fours([fours[3], fours[7]]),
-    ])
 }

@@ -39,7 +39,12 @@ impl<'a> Ways<'a> {
 
 /// What a ray may find in a chunk between its ends.
 #[inline(always)]
-pub fn prospects<L: Sixteen, M: Mode>(ray: &Pooled, chunk: Chunk<'_>, tnear: f32, tfar: f32) -> Prospects<L> {
+pub fn prospects<L: Sixteen, M: Mode>(
+    ray: &Pooled,
+    chunk: Chunk<'_>,
+    tnear: f32,
+    tfar: f32,
+) -> Prospects<16, L> {
     let triangles = Sixteens {
         rows: ray.renamed().map(|axis| chunk.row(axis)),
         corners: chunk.corners(),

@@ -1,4 +1,4 @@
-//! One ray against the sixteen triangles of a pool at once.
+//! One ray against the sixteen triangles of a pool at once, or sixteen rays against one of them.
 //!
 //! What is asked here is not yet whether the ray hits, and where, to the bit: that is the mode's own test to say, of the one
 //! or two triangles that are left in the end. It is which triangles the ray may hit, which of them it hits for certain, and
@@ -18,9 +18,9 @@
 //! `30u R / |dz| + 120u R S span / |sum|`. The bounds here allow for half as much again as both together. Where `sum` is
 //! so small that this means nothing, the depths themselves are bounds: `t` is kept between them.
 
-use super::Shear;
-use crate::geometry::triangle::{RENAMED, Test};
-use crate::simd::Sixteen;
+use super::{Shear, edges, one_sign};
+use crate::geometry::triangle::{Lanes3, RENAMED, Test};
+use crate::simd::{Lanes, Mask, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
 const SLACK: f32 = 1.0 / (1 << 18) as f32;
@@ -42,16 +42,26 @@ pub struct Pooled {
     reach: f32,
 }
 
-/// What a ray may find in sixteen triangles.
-pub struct Prospects<L: Sixteen> {
-    /// Triangles that it may hit between its ends.
+/// What rays may find in triangles: one ray of each lane in one triangle.
+pub struct Prospects<const W: usize, L: Lanes<W>> {
+    /// Where the ray may hit the triangle between its ends.
     pub possible: L::Mask,
-    /// Those that it hits there for certain.
+    /// Where it does for certain.
     pub certain: L::Mask,
     /// `t` lies between this, where it may hit,
     pub first: L,
     /// and this.
     pub last: L,
+}
+
+/// Where rays look for hits, and what is off by how much.
+struct Sight<L> {
+    /// How far the scene reaches from the origins.
+    reach: L,
+    /// What parameters are off by, whatever the triangle.
+    slack: L,
+    tnear: L,
+    tfar: L,
 }
 
 /// Sixteen triangles, by their vertices.
@@ -83,6 +93,14 @@ impl Pooled {
         [i, j, k]
     }
 
+    /// The ray with an origin, of which a [`shear`](shears) was kept, and its greatest axis.
+    #[inline(always)]
+    pub fn of_shear(origin: &[f32; 3], shear: [f32; 3], axis: usize, reach: f32) -> Self {
+        let [i, j, k] = RENAMED[axis % 3];
+        let origin = [origin[i], origin[j], origin[k]];
+        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], reach }
+    }
+
     /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
     /// zero; otherwise they are if those are beyond their error bounds.
     #[inline(always)]
@@ -91,7 +109,7 @@ impl Pooled {
         triangles: &Sixteens<'_>,
         tnear: f32,
         tfar: f32,
-    ) -> Prospects<L> {
+    ) -> Prospects<16, L> {
         // Each vertex translated and sheared, as the ray sees it.
         let [i, j, k] = triangles.rows;
         let [ox, oy, oz] = self.origin;
@@ -102,38 +120,132 @@ impl Pooled {
         let depth = L::splat(scale) * z;
         let size = x.abs() + y.abs();
 
-        // The corners, and the edge functions opposite to them.
+        // The corners.
         let a = L::ids_widen(triangles.corners);
         let (b, c) = (L::ids_shift::<4>(a), L::ids_shift::<8>(a));
-        let (ax, bx, cx) = (x.pick(a), x.pick(b), x.pick(c));
-        let (ay, by, cy) = (y.pick(a), y.pick(b), y.pick(c));
-        let (depth_a, depth_b, depth_c) = (depth.pick(a), depth.pick(b), depth.pick(c));
+        let corners = [
+            [x.pick(a), y.pick(a), depth.pick(a)],
+            [x.pick(b), y.pick(b), depth.pick(b)],
+            [x.pick(c), y.pick(c), depth.pick(c)],
+        ];
         let size = size.pick(a) + size.pick(b) + size.pick(c);
-        let (a, b, c) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
 
-        // Whether it may hit, and whether it does.
-        let reach = L::splat(self.reach);
-        let size = reach * (size + L::splat(DOUBT) * reach);
-        let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
-        let doubt = if SIGNS { L::splat(0.0) } else { L::splat(DOUBT) * size };
-        let (below, above) = (least.lt(L::splat(0.0) - doubt), doubt.lt(greatest));
-        let sure = doubt.lt(least) | greatest.lt(L::splat(0.0) - doubt);
+        let sight = Sight {
+            reach: L::splat(self.reach),
+            slack: L::splat(SLACK * self.reach * scale.abs()),
+            tnear: L::splat(tnear),
+            tfar: L::splat(tfar),
+        };
+        let found = prospects::<16, L, SIGNS>(&corners, size, &sight);
         let present = L::mask_from_bits((1 << triangles.count.min(16)) - 1);
-
-        // Where.
-        let (nearest, farthest) = (depth_a.min(depth_b).min(depth_c), depth_a.max(depth_b).max(depth_c));
-        let share = L::splat(1.0) / (a + b + c);
-        let t = c.mul_add(depth_c, b.mul_add(depth_b, a * depth_a)) * share;
-        let error = L::splat(BLUR) * size * (farthest - nearest) * share.abs();
-        let slack = L::splat(SLACK * self.reach * scale.abs());
-        let first = (t - error).max(nearest) - slack;
-        let last = (t + error).min(farthest) + slack;
-
-        let (tnear, tfar) = (L::splat(tnear), L::splat(tfar));
-        let possible = present & !(below & above) & first.le(tfar) & tnear.le(last);
-        let certain = possible & sure & tnear.le(first) & last.le(tfar);
-        Prospects { possible, certain, first, last }
+        Prospects { possible: present & found.possible, certain: present & found.certain, ..found }
     }
+}
+
+/// What is kept of rays for [`Pooled`] and [`Listed`]: their shears, and a bit for each whose greatest axis is x, and for
+/// each where it is y.
+#[inline(always)]
+pub fn shears<const W: usize, L: Lanes<W>>(
+    origin: &Lanes3<L>,
+    direction: &Lanes3<L>,
+) -> (Lanes3<L>, [u32; 2]) {
+    // (As if no lane mattered: so nobody asks whether all have the same.)
+    let Shear { shear, major_x, major_y, .. } = Shear::<W, L>::new(origin, direction, 0);
+    (shear, [major_x.bits(), major_y.bits()])
+}
+
+/// Rays as pools see them that meet triangles together.
+pub struct Listed<const W: usize, L: Lanes<W>> {
+    frame: Shear<W, L>,
+    reach: L,
+    slack: L,
+}
+
+impl<const W: usize, L: Lanes<W>> Listed<W, L> {
+    /// Rays of which [`shears`] were kept, and from whose origins the scene reaches so far. Where the greatest axis is neither
+    /// x nor, among the others, y, it is z.
+    #[inline(always)]
+    pub fn new(origin: &Lanes3<L>, shear: Lanes3<L>, [is_x, is_y]: [L::Mask; 2], reach: f32) -> Self {
+        // Nobody asks for directions.
+        let mut frame =
+            Shear { major: None, major_x: is_x, major_y: is_y, origin: *origin, direction: *origin, shear };
+        frame.origin = frame.renamed(origin);
+        Self { frame, reach: L::splat(reach), slack: L::splat(SLACK * reach) * shear[2].abs() }
+    }
+
+    /// A vertex translated and sheared, and its depth, as the rays see it.
+    #[inline(always)]
+    pub fn see(&self, vertex: &[f32; 3]) -> Lanes3<L> {
+        let [x, y, z] = self.frame.sheared(vertex);
+        [x, y, self.frame.shear[2] * z]
+    }
+
+    /// Which rays may hit the triangle with such corners, wherever that is; `SIGNS` as for
+    /// [`prospects`](Pooled::prospects).
+    #[inline(always)]
+    pub fn sift<const SIGNS: bool>(&self, corners: &[Lanes3<L>; 3]) -> L::Mask {
+        let edges = edges(corners);
+        if SIGNS {
+            return one_sign(&edges);
+        }
+        let doubt = L::splat(DOUBT) * scope(self.reach, size_of(corners));
+        let [a, b, c] = edges;
+        !(a.min(b).min(c).lt(L::splat(0.0) - doubt) & doubt.lt(a.max(b).max(c)))
+    }
+
+    /// What the rays may find in it between `tnear` and `tfar`.
+    #[inline(always)]
+    pub fn prospects<const SIGNS: bool>(
+        &self,
+        corners: &[Lanes3<L>; 3],
+        tnear: L,
+        tfar: L,
+    ) -> Prospects<W, L> {
+        let sight = Sight { reach: self.reach, slack: self.slack, tnear, tfar };
+        prospects::<W, L, SIGNS>(corners, size_of(corners), &sight)
+    }
+}
+
+/// The sum of the magnitudes of a triangle's sheared coordinates.
+#[inline(always)]
+fn size_of<const W: usize, L: Lanes<W>>([a, b, c]: &[Lanes3<L>; 3]) -> L {
+    (a[0].abs() + a[1].abs()) + (b[0].abs() + b[1].abs()) + (c[0].abs() + c[1].abs())
+}
+
+/// What errors of edge functions are in proportion to.
+#[inline(always)]
+fn scope<const W: usize, L: Lanes<W>>(reach: L, size: L) -> L {
+    reach * (size + L::splat(DOUBT) * reach)
+}
+
+/// What rays may find in triangles of such sizes: sheared corners, and their depths.
+#[inline(always)]
+fn prospects<const W: usize, L: Lanes<W>, const SIGNS: bool>(
+    corners: &[Lanes3<L>; 3],
+    size: L,
+    sight: &Sight<L>,
+) -> Prospects<W, L> {
+    let [[.., depth_a], [.., depth_b], [.., depth_c]] = *corners;
+    let [a, b, c] = edges(corners);
+
+    // Whether it may hit, and whether it does.
+    let size = scope(sight.reach, size);
+    let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
+    let doubt = if SIGNS { L::splat(0.0) } else { L::splat(DOUBT) * size };
+    let (below, above) = (least.lt(L::splat(0.0) - doubt), doubt.lt(greatest));
+    let sure = doubt.lt(least) | greatest.lt(L::splat(0.0) - doubt);
+
+    // Where.
+    let (nearest, farthest) = (depth_a.min(depth_b).min(depth_c), depth_a.max(depth_b).max(depth_c));
+    let share = L::splat(1.0) / (a + b + c);
+    let t = c.mul_add(depth_c, b.mul_add(depth_b, a * depth_a)) * share;
+    let error = L::splat(BLUR) * size * (farthest - nearest) * share.abs();
+    let first = (t - error).max(nearest) - sight.slack;
+    let last = (t + error).min(farthest) + sight.slack;
+
+    let possible = !(below & above) & first.le(sight.tfar) & sight.tnear.le(last);
+    let certain = possible & sure & sight.tnear.le(first) & last.le(sight.tfar);
+    Prospects { possible, certain, first, last }
 }
 
 #[cfg(test)]
@@ -141,9 +253,10 @@ mod tests {
     use super::*;
     use crate::geometry::triangle::exact::Filter;
     use crate::geometry::triangle::{Candidate, Corners, Triangle};
-    use crate::simd::{Chosen, Isa, Lanes, Mask, Simd, Task};
+    use crate::simd::{Chosen, Isa, Simd, Task};
     use crate::weyl::uniform;
     use proptest::prelude::*;
+    use std::array::from_fn;
 
     struct Ask<'a, const SIGNS: bool>(&'a Pooled, &'a Sixteens<'a>, [f32; 2]);
 
@@ -157,6 +270,44 @@ mod tests {
             let Prospects { possible, certain, first, last } =
                 ray.prospects::<S::F16, SIGNS>(triangles, tnear, tfar);
             (possible.bits(), certain.bits(), first.store(), last.store())
+        }
+    }
+
+    /// A ray in some lanes against one triangle after the other: in the last lane of those, and in one where it has another greatest axis.
+    struct AskListed<'a, const SIGNS: bool>(&'a [[f32; 3]; 2], &'a [Corners; 5], f32, [f32; 2]);
+
+    impl<const SIGNS: bool> AskListed<'_, SIGNS> {
+        /// As for [`Ask`].
+        #[inline(always)]
+        fn ask<const W: usize, L: Lanes<W>>(&self) -> (u32, u32, [f32; 16], [f32; 16]) {
+            let Self([origin, direction], triangles, reach, [tnear, tfar]) = *self;
+            // The others' coordinates are renamed otherwise.
+            let turned = |v: &[f32; 3], axis: usize| L::load(&from_fn(|lane| v[(axis + lane + 1) % 3]));
+            let lanes = |v: &[f32; 3]| [turned(v, 0), turned(v, 1), turned(v, 2)];
+            let (origins, directions) = (lanes(origin), lanes(direction));
+            let (shear, axes) = shears::<W, L>(&origins, &directions);
+            let listed = Listed::<W, L>::new(&origins, shear, axes.map(L::mask_from_bits), reach);
+            let (mut all, lane) = ((0, 0, [0.0; 16], [0.0; 16]), W / 3 * 3 - 1);
+            for (i, corners) in triangles.iter().enumerate() {
+                let corners = [listed.see(&corners[0]), listed.see(&corners[1]), listed.see(&corners[2])];
+                let found = listed.prospects::<SIGNS>(&corners, L::splat(tnear), L::splat(tfar));
+                let sifted = listed.sift::<SIGNS>(&corners).bits();
+                assert_eq!(found.possible.bits() & !sifted, 0, "what is possible is not sifted out");
+                all.0 |= (found.possible.bits() >> lane & 1) << i;
+                all.1 |= (found.certain.bits() >> lane & 1) << i;
+                (all.2[i], all.3[i]) = (found.first.store()[lane], found.last.store()[lane]);
+            }
+            all
+        }
+    }
+
+    impl<const SIGNS: bool> Task for AskListed<'_, SIGNS> {
+        /// By eights, and by sixteens.
+        type Output = [(u32, u32, [f32; 16], [f32; 16]); 2];
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Self::Output {
+            [self.ask::<8, S::F8>(), self.ask::<16, S::F16>()]
         }
     }
 
@@ -185,6 +336,18 @@ mod tests {
             let chosen = Chosen::new(isa).expect("it is available");
             let by_signs = chosen.run(Ask::<true>(&pooled, &sixteens, ends));
             let by_bounds = chosen.run(Ask::<false>(&pooled, &sixteens, ends));
+            let ray = [origin, direction];
+            for (of_one, of_lists) in [
+                (by_signs, chosen.run(AskListed::<true>(&ray, corners, reach, ends))),
+                (by_bounds, chosen.run(AskListed::<false>(&ray, corners, reach, ends))),
+            ] {
+                for (possible, certain, first, last) in of_lists {
+                    assert_eq!((possible, certain), (of_one.0, of_one.1), "{isa}, {ray:?}, {corners:?}");
+                    for i in (0..5).filter(|i| possible >> i & 1 == 1) {
+                        assert_eq!((first[i], last[i]), (of_one.2[i], of_one.3[i]), "{isa}, {ray:?}");
+                    }
+                }
+            }
             for (lane, corners) in corners.iter().enumerate() {
                 let triangle = Triangle::new(*corners);
                 let answers = [test.test(&triangle, true), exact.test(&triangle, true)];

@@ -1,0 +1,70 @@
+//! Where a kernel's rays come from: a slice, or packets. (A branch for each eight of them costs nothing, and a kernel for each
+//! would have to be compiled for every instruction set and mode.)
+
+use super::columns::columns;
+use super::lanes::RayPacket;
+use super::walk::load3;
+use crate::geometry::Ray;
+use crate::simd::Eight;
+
+/// Rays in places. A place may be empty.
+#[derive(Clone, Copy)]
+pub enum Source<'a> {
+    /// One after the other.
+    Slice(&'a [Ray]),
+    /// Packets, and the lanes of each that hold a ray.
+    Packets(&'a [RayPacket<16>], &'a [u32]),
+}
+
+impl<'a> Source<'a> {
+    /// The number of places.
+    #[inline(always)]
+    pub fn places(self) -> usize {
+        match self {
+            Self::Slice(rays) => rays.len(),
+            Self::Packets(rays, _) => 16 * rays.len(),
+        }
+    }
+
+    /// The places from number `8 * eight` on, number by number: origins and `tnear`, directions and `tfar`; and a bit for each
+    /// place in which there is a ray. What the others hold means nothing. Panics if there are none.
+    #[inline(always)]
+    pub fn eight<L: Eight>(self, eight: usize) -> ([[L; 4]; 2], u32) {
+        match self {
+            Self::Slice(rays) => {
+                let rays = &rays[8 * eight..];
+                (columns(rays), self.present(eight))
+            }
+            Self::Packets(rays, _) => {
+                let rays = rays[eight / 2].part::<8>(eight % 2);
+                let ([x, y, z], [dx, dy, dz]) = (load3(&rays.origin), load3(&rays.direction));
+                let columns = [[x, y, z, L::load(&rays.tnear)], [dx, dy, dz, L::load(&rays.tfar)]];
+                (columns, self.present(eight))
+            }
+        }
+    }
+
+    /// A bit for each of the places from number `8 * eight` on in which there is a ray.
+    #[inline(always)]
+    pub fn present(self, eight: usize) -> u32 {
+        match self {
+            Self::Slice(rays) => (1 << (rays.len() - 8 * eight).min(8)) - 1,
+            Self::Packets(_, active) => active[eight / 2] >> (8 * (eight % 2)) & 0xff,
+        }
+    }
+
+    /// The ray in a place. Panics if there is no such place.
+    #[inline(always)]
+    pub fn ray(self, place: usize) -> Ray {
+        match self {
+            Self::Slice(rays) => rays[place],
+            Self::Packets(rays, _) => rays[place / 16].get(place % 16),
+        }
+    }
+
+    /// The same as two rows: origin and `tnear`, direction and `tfar`.
+    #[inline(always)]
+    pub fn rows(self, place: usize) -> [[f32; 4]; 2] {
+        bytemuck::cast(self.ray(place))
+    }
+}
