@@ -1,11 +1,11 @@
-//! Where a kernel's rays come from: a slice, or packets. (A branch for each eight of them costs nothing, and a kernel for each
+//! Where a kernel's rays come from: a slice, or packets. (A branch for each sixteen of them costs nothing, and a kernel for each
 //! would have to be compiled for every instruction set and mode.)
 
 use super::columns::columns;
 use super::lanes::RayPacket;
 use super::walk::load3;
 use crate::geometry::Ray;
-use crate::simd::Eight;
+use crate::simd::Sixteen;
 
 /// Rays in places. A place may be empty.
 #[derive(Clone, Copy)]
@@ -26,30 +26,27 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The places from number `8 * eight` on, number by number: origins and `tnear`, directions and `tfar`; and a bit for each
+    /// The places from number `16 * sixteen` on, number by number: origins and `tnear`, directions and `tfar`; and a bit for each
     /// place in which there is a ray. What the others hold means nothing. Panics if there are none.
     #[inline(always)]
-    pub fn eight<L: Eight>(self, eight: usize) -> ([[L; 4]; 2], u32) {
-        match self {
-            Self::Slice(rays) => {
-                let rays = &rays[8 * eight..];
-                (columns(rays), self.present(eight))
-            }
+    pub fn sixteen<L: Sixteen>(self, sixteen: usize) -> ([[L; 4]; 2], u32) {
+        let columns = match self {
+            Self::Slice(rays) => columns(&rays[16 * sixteen..]),
             Self::Packets(rays, _) => {
-                let rays = rays[eight / 2].part::<8>(eight % 2);
+                let rays = &rays[sixteen];
                 let ([x, y, z], [dx, dy, dz]) = (load3(&rays.origin), load3(&rays.direction));
-                let columns = [[x, y, z, L::load(&rays.tnear)], [dx, dy, dz, L::load(&rays.tfar)]];
-                (columns, self.present(eight))
+                [[x, y, z, L::load(&rays.tnear)], [dx, dy, dz, L::load(&rays.tfar)]]
             }
-        }
+        };
+        (columns, self.present(sixteen))
     }
 
-    /// A bit for each of the places from number `8 * eight` on in which there is a ray.
+    /// A bit for each of the places from number `16 * sixteen` on in which there is a ray.
     #[inline(always)]
-    pub fn present(self, eight: usize) -> u32 {
+    pub fn present(self, sixteen: usize) -> u32 {
         match self {
-            Self::Slice(rays) => (1 << (rays.len() - 8 * eight).min(8)) - 1,
-            Self::Packets(_, active) => active[eight / 2] >> (8 * (eight % 2)) & 0xff,
+            Self::Slice(rays) => (1 << (rays.len() - 16 * sixteen).min(16)) - 1,
+            Self::Packets(_, active) => active[sixteen] & 0xffff,
         }
     }
 

@@ -1,18 +1,18 @@
 //! Lists of rays through an [`Accel`].
 
 use super::ground::{OfBoxes, OfLines};
-use super::{ByEights, trace};
+use super::{BySixteens, trace};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::Pools;
-use crate::simd::{Eight, Simd};
+use crate::simd::Simd;
 use crate::traverse::pool::answers::{Met16, Pairs, Told};
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
 use crate::traverse::source::Source;
 use crate::traverse::stream::{Answers, Any, Closest};
-use crate::traverse::{Accel, RayPacket, closest};
+use crate::traverse::{Accel, RayPacket};
 
 impl Accel {
     /// The closest hit of each ray, by lists of rays.
@@ -38,7 +38,7 @@ impl Accel {
     }
 
     /// Has lists answered: through boxes and pools if they have been made.
-    fn ask_lists(&self, rays: Source<'_>, answers: impl ByEights) {
+    fn ask_lists(&self, rays: Source<'_>, answers: impl BySixteens) {
         match self.pools() {
             Some(pools) => self.ask_closed(InBoxes { pools, rays, answers }),
             None => self.ask_all_in_memory(Filter { rays, answers }),
@@ -51,7 +51,7 @@ struct Filter<'a, A> {
     answers: A,
 }
 
-impl<A: ByEights> ResidentQuery for Filter<'_, A> {
+impl<A: BySixteens> ResidentQuery for Filter<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         trace::<S, M, _, A>(tree, &OfLines(tree.tree), self.rays, &mut self.answers);
@@ -64,7 +64,7 @@ struct InBoxes<'a, A> {
     answers: A,
 }
 
-impl<A: ByEights> ResidentQuery for InBoxes<'_, A> {
+impl<A: BySixteens> ResidentQuery for InBoxes<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         trace::<S, M, _, A>(tree, &OfBoxes(Ways::new(self.pools)), self.rays, &mut self.answers);
@@ -113,17 +113,16 @@ impl Told for Found<'_> {
     }
 }
 
-impl ByEights for Found<'_> {
+impl BySixteens for Found<'_> {
     #[inline(always)]
-    fn give<L: Eight>(&mut self, eight: usize, closest: &closest::Closest<8, L>) {
-        let found = closest.found() & 0xff;
+    fn give(&mut self, sixteen: usize, done: u32) {
         match self {
             Self::Rays(rays) => {
-                for (lane, ray) in rays[8 * eight..].iter_mut().take(8).enumerate() {
-                    *ray = found >> lane & 1 == 1;
+                for (lane, ray) in rays[16 * sixteen..].iter_mut().take(16).enumerate() {
+                    *ray = done >> lane & 1 == 1;
                 }
             }
-            Self::Lanes(lanes) => lanes[eight / 2] |= found << (8 * (eight % 2)),
+            Self::Lanes(lanes) => lanes[sixteen] |= done,
         }
     }
 }

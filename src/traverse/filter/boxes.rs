@@ -6,7 +6,8 @@
 //! (A ray by itself meets all eight at once.)
 //!
 //! A box that a ray enters lies in the one that it came from, so an interval begins where the last box was entered; where it
-//! ends is not kept, as nobody asks.
+//! ends is not kept, as nobody asks. Of rays that ask for any hit nobody asks where they enter a box, either: nothing that they
+//! find makes them shorter.
 
 use super::cut::present;
 use super::lists::{Entries, Heads, List};
@@ -33,9 +34,10 @@ struct Seen<const W: usize, L: Lanes<W>> {
 impl<const W: usize, L: Dense<W>> Seen<W, L> {
     /// The rays of up to `W` entries.
     #[inline(always)]
-    fn new(lot: &Lot, entries: &Entries, at: usize, count: usize) -> Self {
+    fn new<const ANY: bool>(lot: &Lot, entries: &Entries, at: usize, count: usize) -> Self {
         let (ids, tmin) = entries.starts::<W, L>(at);
         let crossing = lot.crossing::<W, L>(&ids);
+        let tmin = if ANY { crossing.begin } else { tmin };
         let ([mut near, mut far], closest) = ([[tmin; 3]; 2], crossing.closest);
         for axis in 0..3 {
             [near[axis], far[axis]] =
@@ -60,9 +62,25 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
     }
 }
 
+/// Writes the entries of rays whose bits are set, which enter a box there.
+#[inline(always)]
+fn write<const W: usize, L: Dense<W>, const ANY: bool>(
+    entries: &mut Entries,
+    at: usize,
+    bits: u32,
+    ids: L::Ids,
+    enters: L,
+) {
+    if ANY {
+        entries.write_ids::<W, L>(at, bits, ids);
+    } else {
+        entries.write_starts::<W, L>(at, bits, ids, enters);
+    }
+}
+
 /// Has a list meet a node's boxes, and puts what comes out on the stack, the nearest on top.
 #[inline(always)]
-pub fn cut<const W: usize, L: Dense<W>>(
+pub fn cut<const W: usize, L: Dense<W>, const ANY: bool>(
     node: &Boxes,
     octant: usize,
     lot: &Lot,
@@ -74,12 +92,12 @@ pub fn cut<const W: usize, L: Dense<W>>(
     let lanes = node.lanes(octant);
     if len <= W {
         // All are in registers, and what comes out takes their place.
-        let seen = Seen::<W, L>::new(lot, entries, at, len);
+        let seen = Seen::<W, L>::new::<ANY>(lot, entries, at, len);
         let mut next = at;
-        for lane in lanes {
+        for &lane in &lanes {
             let (bits, enters) = seen.meet(node, octant, lane);
             let count = bits.count_ones() as usize;
-            entries.write_starts::<W, L>(next, bits, seen.ids, enters);
+            write::<W, L, ANY>(entries, next, bits, seen.ids, enters);
             heads.push(node.ways[lane], next, count);
             next += count;
         }
@@ -90,28 +108,39 @@ pub fn cut<const W: usize, L: Dense<W>>(
     let begin = list.behind();
     let mut next = begin;
     for done in (0..len).step_by(W) {
-        let seen = Seen::<W, L>::new(lot, entries, at + done, len - done);
+        let seen = Seen::<W, L>::new::<ANY>(lot, entries, at + done, len - done);
         if seen.live == 0 {
             continue;
         }
-        for (place, lane) in lanes.into_iter().enumerate() {
+        for (place, &lane) in lanes.iter().enumerate() {
             let (bits, enters) = seen.meet(node, octant, lane);
-            entries.write_starts::<W, L>(next[place], bits, seen.ids, enters);
+            write::<W, L, ANY>(entries, next[place], bits, seen.ids, enters);
             next[place] += bits.count_ones() as usize;
         }
     }
-    for (place, lane) in lanes.into_iter().enumerate() {
+    for (place, &lane) in lanes.iter().enumerate() {
         heads.push(node.ways[lane], begin[place], next[place] - begin[place]);
     }
 }
 
 /// Takes a ray of a list by itself through a node: its boxes have the lanes then, as in a stream.
 #[inline(always)]
-pub fn take_one<L: Eight>(node: &Boxes, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
+pub fn take_one<L: Eight, const ANY: bool>(
+    node: &Boxes,
+    lot: &Lot,
+    entries: &mut Entries,
+    heads: &mut Heads,
+    list: &List,
+) {
     let at = list.at as usize;
     let (id, tmin, _) = entries.one(at);
     let (slabs, closest) = lot.slabs(id);
+    let tmin = if ANY { lot.begin(id) } else { tmin };
     let Met { order, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest);
-    entries.write_starts_of(at, bits, id, enters);
+    if ANY {
+        entries.write_id(at, id);
+    } else {
+        entries.write_starts_of(at, bits, id, enters);
+    }
     heads.push_each::<L>(L::ids_pick(L::ids_load(&node.ways), order), bits, at);
 }

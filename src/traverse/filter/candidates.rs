@@ -4,10 +4,10 @@
 //! [stream](crate::traverse::pool), the mode's own test is asked in the end, of what does not begin behind what its ray hits
 //! for certain: of one or two triangles a ray. Until then nobody fetches their records.
 
+use super::cut::present;
 use super::lot::Lot;
 use crate::geometry::triangle::{Mode, Test};
-use crate::simd::Dense;
-use crate::traverse::closest::NONE;
+use crate::simd::{Dense, Mask, Sixteen};
 use crate::traverse::kernel::Kernel;
 use crate::traverse::records::Resident;
 use crate::traverse::source::Source;
@@ -64,14 +64,30 @@ impl Candidates {
         self.count > MOST
     }
 
-    /// The rays and triangles of all of them that do not lie behind what their rays hit for certain. None is left.
+    /// How many rows of sixteen they fill.
+    pub const fn rows(&self) -> usize {
+        self.count.div_ceil(REGISTER)
+    }
+
+    /// One of the rows: the places of the rays, the triangles, and a bit for each that does not lie behind what its ray hits for
+    /// certain. The lot's rays are those from `place` on.
     #[inline(always)]
-    pub fn take<'a>(&'a mut self, lot: &'a Lot) -> impl Iterator<Item = (i32, i32)> + 'a {
-        let count = std::mem::take(&mut self.count);
-        let pairs = self.rays[..count].iter().zip(&self.primitives).zip(&self.first);
-        pairs
-            .filter(|((ray, _), first)| **first <= lot.found_by(**ray).0)
-            .map(|((&ray, &primitive), _)| (ray, primitive))
+    pub fn row<L: Sixteen>(&self, row: usize, lot: &Lot, place: usize) -> ([i32; 16], &[i32; 16], u32) {
+        let (at, room) = (REGISTER * row, "a register behind the last");
+        let ids: &[i32; 16] = self.rays[at..].first_chunk().expect(room);
+        let (mut places, mut closest) = ([0; 16], [0.0; 16]);
+        for lane in 0..16 {
+            places[lane] = (place + Lot::place(ids[lane])) as i32;
+            (closest[lane], _) = lot.found_by(ids[lane]);
+        }
+        let first = L::load(self.first[at..].first_chunk().expect(room));
+        let bits = first.le(L::load(&closest)).bits() & present((self.count - at).min(16));
+        (places, self.primitives[at..].first_chunk().expect(room), bits)
+    }
+
+    /// Forgets all of them.
+    pub const fn clear(&mut self) {
+        self.count = 0;
     }
 
     /// Asks the mode's own test of all of them. What a ray hits is what it has found; with `ANY`, it is done. The lot's rays are
@@ -88,16 +104,20 @@ impl Candidates {
         for i in 0..std::mem::take(&mut self.count) {
             let (id, primitive) = (self.rays[i], self.primitives[i]);
             let (closest, other) = lot.found_by(id);
-            if self.first[i] > closest {
+            if closest < self.first[i] {
                 continue;
             }
             let ray = rays.ray(place + Lot::place(id));
             let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
             let candidate = test.test(&resident.records[primitive as usize], true);
             let t = candidate.t;
-            let nearer = t < closest || t == closest && (other == NONE || primitive < other);
-            if candidate.inside && ray.tnear <= t && nearer {
-                lot.keep_one(id, if ANY { f32::NEG_INFINITY } else { t }, primitive);
+            let is_nearer = t < closest || t == closest && (ANY || primitive < other);
+            if candidate.inside && ray.tnear <= t && is_nearer {
+                if ANY {
+                    lot.end(id);
+                } else {
+                    lot.keep_one(id, t, primitive);
+                }
             }
         }
     }

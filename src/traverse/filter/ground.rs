@@ -31,10 +31,16 @@ pub trait Ground {
     fn fetch(&self, place: i32);
 
     /// Takes a list of one ray through an inner place, and puts what comes out on the stack, the nearest on top.
-    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List);
+    fn take_one<F: Eight, const ANY: bool>(
+        &self,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    );
 
     /// The same of a longer list, of rays that run into an octant, `W` at a time.
-    fn cut<const W: usize, L: Dense<W>, F: Eight>(
+    fn cut<const W: usize, L: Dense<W>, F: Eight, const ANY: bool>(
         &self,
         octant: usize,
         lot: &Lot,
@@ -97,12 +103,18 @@ impl Ground for OfLines<'_> {
     }
 
     #[inline(always)]
-    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
+    fn take_one<F: Eight, const ANY: bool>(
+        &self,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    ) {
         cut::take_one::<F>(&self.0.lines()[Exit(list.exit).line()], lot, entries, heads, list);
     }
 
     #[inline(always)]
-    fn cut<const W: usize, L: Dense<W>, F: Eight>(
+    fn cut<const W: usize, L: Dense<W>, F: Eight, const ANY: bool>(
         &self,
         octant: usize,
         lot: &Lot,
@@ -137,7 +149,7 @@ impl Ground for OfLines<'_> {
 pub struct OfBoxes<'a>(pub Ways<'a>);
 
 /// What few rays are in a pool: by themselves they meet its triangles all at once.
-const FEW: u32 = 2;
+const FEW: u32 = 3;
 
 impl OfBoxes<'_> {
     /// The chunks of the pool that a list is in.
@@ -185,12 +197,18 @@ impl Ground for OfBoxes<'_> {
     }
 
     #[inline(always)]
-    fn take_one<F: Eight>(&self, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
-        boxes::take_one::<F>(&self.0.nodes[Way(list.exit).node()], lot, entries, heads, list);
+    fn take_one<F: Eight, const ANY: bool>(
+        &self,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    ) {
+        boxes::take_one::<F, ANY>(&self.0.nodes[Way(list.exit).node()], lot, entries, heads, list);
     }
 
     #[inline(always)]
-    fn cut<const W: usize, L: Dense<W>, F: Eight>(
+    fn cut<const W: usize, L: Dense<W>, F: Eight, const ANY: bool>(
         &self,
         octant: usize,
         lot: &Lot,
@@ -198,7 +216,7 @@ impl Ground for OfBoxes<'_> {
         heads: &mut Heads,
         list: &List,
     ) {
-        boxes::cut::<W, L>(&self.0.nodes[Way(list.exit).node()], octant, lot, entries, heads, list);
+        boxes::cut::<W, L, ANY>(&self.0.nodes[Way(list.exit).node()], octant, lot, entries, heads, list);
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! The stack of lists: rays that wait at places of the tree, with their intervals there.
 
-use super::lot::{LOT, Lot};
+use super::lot::LOT;
 use crate::simd::{Dense, Eight};
 
 /// Lines, or nodes of boxes, on a way from the root to a leaf. (A line is three levels, a node of boxes can be one.)
@@ -115,15 +115,14 @@ impl Entries {
         }
     }
 
-    /// Writes the rays of an octant from `at` on, where they are inside the scene's bounds; where the next octant's
+    /// Writes rays of an octant from `at` on, and their intervals inside of the scene's bounds; where the next octant's
     /// may begin.
     #[inline(always)]
-    pub fn begin(&mut self, rays: &[i32], lot: &Lot, at: usize) -> usize {
-        for (i, &id) in rays.iter().enumerate() {
-            let (place, ray) = ((at + i) % ENTRIES, id as usize % LOT);
-            (self.ids[place], self.tmin[place], self.tmax[place]) = (id, lot.tmin[ray], lot.tmax[ray]);
-        }
-        at + room(rays.len())
+    pub fn begin(&mut self, ids: &[i32], [tmin, tmax]: [&[f32]; 2], at: usize) -> usize {
+        self.ids[at..][..ids.len()].copy_from_slice(ids);
+        self.tmin[at..][..ids.len()].copy_from_slice(tmin);
+        self.tmax[at..][..ids.len()].copy_from_slice(tmax);
+        at + room(ids.len())
     }
 
     /// Some rays' numbers, and their intervals.
@@ -175,6 +174,19 @@ impl Entries {
         let (at, room) = (at % ENTRIES, "a register behind each");
         L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
         tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
+    }
+
+    /// The same without intervals.
+    #[inline(always)]
+    pub fn write_ids<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids) {
+        let to = self.ids[at % ENTRIES..].first_chunk_mut().expect("a register behind each");
+        L::close_up_ids(ids, bits, to);
+    }
+
+    /// Writes one ray's number at eight places.
+    #[inline(always)]
+    pub fn write_id(&mut self, at: usize, id: i32) {
+        *self.ids[at % ENTRIES..].first_chunk_mut().expect("a register behind each") = [id; 8];
     }
 
     /// The same of one ray, which begins at several places.

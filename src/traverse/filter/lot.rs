@@ -3,9 +3,8 @@
 use crate::geometry::Aabb;
 use crate::geometry::triangle::pooled::{Listed, Pooled, shears};
 use crate::kdtree::Line;
-use crate::simd::{Dense, Eight, Lanes, Mask};
+use crate::simd::{Dense, Eight, Lanes, Mask, Sixteen};
 use crate::traverse::closest::{Closest, NONE};
-use crate::traverse::columns::rows;
 use crate::traverse::kernel::Kernel;
 use crate::traverse::pool::step::Slabs;
 use crate::traverse::ready::Ready;
@@ -20,6 +19,9 @@ pub const LOT: usize = Kernel::Filter.width();
 /// A ray's id is its number in the lot, and of a sheared ray the greatest axis of its direction as well, so many times over.
 const AXIS: i32 = LOT as i32;
 
+/// Where a ray ends that is done: before anything.
+pub const DONE: f32 = f32::NEG_INFINITY;
+
 /// A ray on its way, in half a cache line.
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
@@ -27,8 +29,14 @@ struct Traveller {
     /// Its origin, and what a hit must not lie beyond: the closest `t`, or `tfar`. Of a ray that is done less than
     /// anything.
     start: [f32; 4],
-    /// 1 / direction, and the bits of the closest triangle's id, or of [`NONE`].
+    /// 1 / direction, and the bits of the closest triangle's id, or of [`NONE`]. Of a sheared ray that asks for any hit where it is
+    /// inside the scene's bounds from.
     inverse: [f32; 4],
+}
+
+impl Traveller {
+    /// One that has found nothing.
+    const NONE: Self = Self { start: [0.0; 4], inverse: [0.0, 0.0, 0.0, f32::from_bits(NONE as u32)] };
 }
 
 /// Rays of a list as planes see them.
@@ -39,118 +47,152 @@ pub struct Crossing<L> {
     pub margin: [L; 3],
     /// Where each ray ends.
     pub closest: L,
+    /// Where each begins, if that is kept with it.
+    pub begin: L,
 }
 
-/// The rays.
+/// The rays that run into an octant, one after the other, and room for a register.
+#[derive(Clone)]
+pub struct Octant {
+    ids: [i32; LOT + 16],
+    tmin: [f32; LOT + 16],
+    tmax: [f32; LOT + 16],
+    count: usize,
+}
+
+impl Octant {
+    const NONE: Self = Self { ids: [0; LOT + 16], tmin: [0.0; LOT + 16], tmax: [0.0; LOT + 16], count: 0 };
+
+    /// Puts those rays there whose bits are set.
+    #[inline(always)]
+    fn put<L: Sixteen>(&mut self, bits: u32, ids: L::Ids, [tmin, tmax]: [L; 2]) {
+        let (at, room) = (self.count % (LOT + 1), "a register behind the last");
+        L::ids_compact(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
+        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
+        tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
+        self.count = at + bits.count_ones() as usize;
+    }
+
+    /// Their ids.
+    #[inline(always)]
+    pub fn ids(&self) -> &[i32] {
+        &self.ids[..self.count]
+    }
+
+    /// Where they begin, and where they end, as far as they are inside of the scene's bounds.
+    #[inline(always)]
+    pub fn intervals(&self) -> [&[f32]; 2] {
+        [&self.tmin[..self.count], &self.tmax[..self.count]]
+    }
+}
+
+/// The rays. (In this order, so that no row crosses lines of the cache.)
+#[repr(C, align(64))]
 pub struct Lot {
     travellers: [Traveller; LOT],
     /// Their directions, or [shears], and `tnear`.
     ways: [[f32; 4]; LOT],
-    /// Where each ray is inside the scene's bounds.
-    pub tmin: [f32; LOT],
-    pub tmax: [f32; LOT],
-    /// The ids of the rays that run into each octant, and how many these are. Bit 0 of an octant's number says that they run down
-    /// along x.
-    octants: [[i32; LOT]; 8],
-    counts: [usize; 8],
-    /// For each eight rays, those whose numbers lie near the ends of the floats' range, or that are none.
-    odd: [u8; LOT / 8],
+    /// The ids of the rays that run into each octant, with where they are inside the scene's bounds, and how many these are. Bit 0
+    /// of an octant's number says that they run down along x.
+    octants: Box<[Octant; 8]>,
+    /// For each sixteen rays, those whose numbers lie near the ends of the floats' range, or that are none.
+    odd: [u16; LOT / 16],
     /// Half the thickness of walls: that of the ray to which the scene reaches farthest.
     thickness: f32,
 }
 
 impl Lot {
     /// A lot that nothing is known of.
-    pub const fn new() -> Self {
+    pub fn new() -> Self {
         Self {
-            travellers: [Traveller { start: [0.0; 4], inverse: [0.0; 4] }; LOT],
+            travellers: [Traveller::NONE; LOT],
             ways: [[0.0; 4]; LOT],
-            tmin: [0.0; LOT],
-            tmax: [0.0; LOT],
-            octants: [[0; LOT]; 8],
-            counts: [0; 8],
-            odd: [0; LOT / 8],
+            octants: Box::new([const { Octant::NONE }; 8]),
+            odd: [0; LOT / 16],
             thickness: 0.0,
         }
     }
 
-    /// Takes all rays of up to [`LOT`] places, those of some eights, to be odd.
-    pub fn leave(&mut self, rays: Source<'_>, eights: Range<usize>) {
-        let places = 8 * eights.len();
-        for (of_lot, eight) in eights.enumerate() {
-            self.odd[of_lot] = rays.present(eight) as u8;
+    /// Takes all rays of up to [`LOT`] places, those of some sixteens, to be odd.
+    pub fn leave(&mut self, rays: Source<'_>, sixteens: Range<usize>) {
+        let places = 16 * sixteens.len();
+        for (of_lot, sixteen) in sixteens.enumerate() {
+            self.odd[of_lot] = rays.present(sixteen) as u16;
         }
-        for traveller in &mut self.travellers[..places] {
-            traveller.inverse[3] = f32::from_bits(NONE as u32);
-        }
+        self.travellers[..places].fill(Traveller::NONE);
     }
 
-    /// Makes the rays of up to [`LOT`] places ready, those of some eights. With `SHEARS`, shears are kept of them in place of
-    /// directions.
+    /// Makes the rays of up to [`LOT`] places ready, those of some sixteens. With `SHEARS`, shears are kept of them in place of
+    /// directions. With `BEGIN`, it is kept with each where it begins; without, the id of what it has found.
     #[inline(always)]
-    pub fn prepare<L: Eight, const SHEARS: bool>(
+    pub fn prepare<L: Sixteen, const SHEARS: bool, const BEGIN: bool>(
         &mut self,
         rays: Source<'_>,
-        eights: Range<usize>,
+        sixteens: Range<usize>,
         bounds: &Aabb,
     ) {
-        self.counts = [0; 8];
+        self.octants.iter_mut().for_each(|octant| octant.count = 0);
         let mut greatest_reach = L::splat(0.0);
-        for (of_lot, eight) in eights.enumerate() {
-            let reach = self.prepare_eight::<L, SHEARS>(rays, eight, of_lot % (LOT / 8), bounds);
+        for (of_lot, sixteen) in sixteens.enumerate() {
+            let of_lot = of_lot % (LOT / 16);
+            let reach = self.prepare_sixteen::<L, SHEARS, BEGIN>(rays, sixteen, of_lot, bounds);
             greatest_reach = reach.max(greatest_reach);
         }
         self.thickness = greatest_reach.greatest() * MARGIN;
     }
 
-    /// Eight of them, to be the lot's number `of_lot`; how far the scene reaches from each of those that meet it.
+    /// Sixteen of them, to be the lot's number `of_lot`; how far the scene reaches from each of those that meet it.
     #[inline(always)]
-    fn prepare_eight<L: Eight, const SHEARS: bool>(
+    fn prepare_sixteen<L: Sixteen, const SHEARS: bool, const BEGIN: bool>(
         &mut self,
         rays: Source<'_>,
-        eight: usize,
+        sixteen: usize,
         of_lot: usize,
         bounds: &Aabb,
     ) -> L {
-        let ([[x, y, z, tnear], [dx, dy, dz, tfar]], present) = rays.eight::<L>(eight);
+        let ([[x, y, z, tnear], [dx, dy, dz, tfar]], present) = rays.sixteen::<L>(sixteen);
         let (origin, direction) = ([x, y, z], [dx, dy, dz]);
         let Ready { inverse, reach, tmin, tmax, closest, ordinary, flies, .. } =
             Ready::new(&origin, &direction, tnear, tfar, bounds);
-        self.odd[of_lot] = (!ordinary & present) as u8;
-        let place = 8 * of_lot;
-        let room = "eights fill the lot";
-        *self.tmin[place..].first_chunk_mut().expect(room) = tmin.store();
-        *self.tmax[place..].first_chunk_mut().expect(room) = tmax.store();
+        self.odd[of_lot] = (!ordinary & present) as u16;
+        let flies = flies & present;
+        let fly = L::mask_from_bits(flies);
 
-        // (Where there is no ray, nobody looks for anything.)
+        // Who does not fly has found nothing, wherever it ends.
+        let closest = L::select(fly, closest, L::splat(f32::MAX));
         let nothing = L::splat(f32::from_bits(NONE as u32));
-        let starts = rows([x, y, z, closest]);
-        let inverses = rows([inverse[0], inverse[1], inverse[2], nothing]);
-        for (lane, traveller) in self.travellers[place..].iter_mut().take(8).enumerate() {
+        let starts = L::fours(&[x, y, z, closest]);
+        let last = if BEGIN { tmin } else { nothing };
+        let inverses = L::fours(&[inverse[0], inverse[1], inverse[2], last]);
+        let everybody = L::mask_from_bits(0xffff);
+        let (way, [is_x, is_y]) =
+            if SHEARS { shears(&origin, &direction) } else { (direction, [everybody; 2]) };
+        let place = 16 * of_lot;
+        for (lane, traveller) in self.travellers[place..].iter_mut().take(16).enumerate() {
             *traveller = Traveller { start: starts[lane], inverse: inverses[lane] };
         }
-        let ([wx, wy, wz], [is_x, is_y]) =
-            if SHEARS { shears(&origin, &direction) } else { (direction, [0xff, 0]) };
-        *self.ways[place..].first_chunk_mut().expect(room) = rows([wx, wy, wz, tnear]);
+        let room = "sixteens fill the lot";
+        *self.ways[place..].first_chunk_mut().expect(room) = L::fours(&[way[0], way[1], way[2], tnear]);
 
+        // Each to its octant.
+        let mut ids = [[0; 16]; 3];
+        for (axis, ids) in ids.iter_mut().enumerate() {
+            for (lane, id) in ids.iter_mut().enumerate() {
+                *id = (place + lane) as i32 + axis as i32 * AXIS;
+            }
+        }
+        let [if_x, if_y, if_z] = [L::ids_load(&ids[0]), L::ids_load(&ids[1]), L::ids_load(&ids[2])];
+        let ids = L::ids_select(is_x, if_x, L::ids_select(is_y, if_y, if_z));
         let zero = L::splat(0.0);
         let down = [inverse[0].lt(zero).bits(), inverse[1].lt(zero).bits(), inverse[2].lt(zero).bits()];
-        let mut left = flies & present;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize & 7;
-            left &= left - 1;
-            let octant =
-                (down[0] >> lane & 1 | (down[1] >> lane & 1) << 1 | (down[2] >> lane & 1) << 2) as usize;
-            let axis = match (is_x >> lane & 1, is_y >> lane & 1) {
-                (1, _) => 0,
-                (_, 1) => AXIS,
-                _ => 2 * AXIS,
-            };
-            let count = &mut self.counts[octant];
-            self.octants[octant][*count % LOT] = (place + lane) as i32 + axis;
-            *count += 1;
+        for (number, octant) in self.octants.iter_mut().enumerate() {
+            let mut bits = flies;
+            for (axis, down) in down.iter().enumerate() {
+                bits &= if number >> axis & 1 == 1 { *down } else { !down };
+            }
+            octant.put::<L>(bits, ids, [tmin, tmax]);
         }
-        L::select(L::mask_from_bits(flies & present), reach, zero)
+        L::select(fly, reach, zero)
     }
 
     /// A ray's number in the lot.
@@ -159,10 +201,10 @@ impl Lot {
         id as usize % LOT
     }
 
-    /// The ids of the rays that run into an octant.
+    /// The rays that run into an octant.
     #[inline(always)]
-    pub fn octant(&self, octant: usize) -> &[i32] {
-        &self.octants[octant][..self.counts[octant]]
+    pub fn octant(&self, octant: usize) -> &Octant {
+        &self.octants[octant]
     }
 
     /// Rays as planes see them.
@@ -175,10 +217,10 @@ impl Lot {
             (starts[lane], inverses[lane]) = (&traveller.start, &traveller.inverse);
         }
         let [x, y, z, closest] = L::columns(&starts);
-        let [inverse_x, inverse_y, inverse_z, _] = L::columns(&inverses);
+        let [inverse_x, inverse_y, inverse_z, begin] = L::columns(&inverses);
         let thickness = L::splat(self.thickness);
         let margin = [thickness * inverse_x.abs(), thickness * inverse_y.abs(), thickness * inverse_z.abs()];
-        Crossing { origin: [x, y, z], inverse: [inverse_x, inverse_y, inverse_z], margin, closest }
+        Crossing { origin: [x, y, z], inverse: [inverse_x, inverse_y, inverse_z], margin, closest, begin }
     }
 
     /// A ray as a line's planes see it, and where it ends.
@@ -200,6 +242,12 @@ impl Lot {
         let inverse = [by_x, by_y, by_z];
         let margin = inverse.map(|inverse| self.thickness * inverse.abs());
         (Slabs::new(&[x, y, z], &inverse, &margin), closest)
+    }
+
+    /// Where a ray begins, if that is kept with it.
+    #[inline(always)]
+    pub fn begin(&self, id: i32) -> f32 {
+        self.travellers[id as usize % LOT].inverse[3]
     }
 
     /// How far the scene reaches from any of the rays.
@@ -241,6 +289,12 @@ impl Lot {
         (traveller.start[3], traveller.inverse[3].to_bits() as i32)
     }
 
+    /// A ray that asks for any hit is done.
+    #[inline(always)]
+    pub fn end(&mut self, id: i32) {
+        self.travellers[id as usize % LOT].start[3] = DONE;
+    }
+
     /// Keeps what a ray has found.
     #[inline(always)]
     pub fn keep_one(&mut self, id: i32, t: f32, primitive: i32) {
@@ -274,12 +328,20 @@ impl Lot {
         L::columns(&ways)
     }
 
-    /// What the rays from number `8 * eight` on have found.
+    /// The triangles that the rays from number `16 * sixteen` on have found, or [`NONE`], where it is kept.
     #[inline(always)]
-    pub fn closest<L: Eight>(&self, eight: usize) -> Closest<8, L> {
-        let first = 8 * eight as i32;
-        let ids = [first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6, first + 7];
-        self.found::<8, L>(&ids).0
+    pub fn primitives(&self, sixteen: usize) -> [i32; 16] {
+        let travellers: &[Traveller; 16] =
+            self.travellers[16 * sixteen..].first_chunk().expect("sixteens fill the lot");
+        std::array::from_fn(|lane| travellers[lane].inverse[3].to_bits() as i32)
+    }
+
+    /// A bit for each of those rays that is done.
+    #[inline(always)]
+    pub fn done(&self, sixteen: usize) -> u32 {
+        let travellers = self.travellers[16 * sixteen..].iter().take(16);
+        let done = travellers.map(|traveller| u32::from(traveller.start[3] == DONE));
+        done.enumerate().fold(0, |bits, (lane, done)| bits | done << lane)
     }
 
     /// Keeps what those of some rays have found whose bits are set.
@@ -310,8 +372,8 @@ impl Lot {
         }
     }
 
-    /// Of the rays from number `8 * eight` on, those that are left to the packet kernel.
-    pub fn odd(&self, eight: usize) -> u32 {
-        u32::from(self.odd[eight])
+    /// Of those rays, the ones that are left to the packet kernel.
+    pub fn odd(&self, sixteen: usize) -> u32 {
+        u32::from(self.odd[sixteen])
     }
 }

@@ -34,7 +34,7 @@ mod lists;
 mod lot;
 mod pool;
 
-use super::closest::Closest;
+use super::closest::NONE;
 use super::pool::answers::{Pairs, Told};
 use super::records::Resident;
 use super::source::Source;
@@ -42,7 +42,7 @@ use super::stream;
 use crate::geometry::Hit;
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Eight, Simd};
+use crate::simd::Simd;
 use candidates::Candidates;
 use ground::{Ground, Rays};
 use lists::{Entries, Heads};
@@ -51,17 +51,17 @@ use pool::Seen;
 use std::cell::Cell;
 use std::ops::Range;
 
-/// What is asked of each ray, eight answers at a time.
-pub trait ByEights: Told {
-    /// Gives the answers of the rays in the places from number `8 * eight` on, as far as they are known: closest hits are told
-    /// afterwards.
-    fn give<L: Eight>(&mut self, eight: usize, found: &Closest<8, L>);
+/// What is asked of each ray, sixteen answers at a time.
+pub trait BySixteens: Told {
+    /// Gives the answers of the rays in the places from number `16 * sixteen` on, as far as they are known: which of them are done.
+    /// Closest hits are told afterwards.
+    fn give(&mut self, sixteen: usize, done: u32);
 }
 
-impl ByEights for stream::Closest<'_> {
+impl BySixteens for stream::Closest<'_> {
     #[inline(always)]
-    fn give<L: Eight>(&mut self, eight: usize, _: &Closest<8, L>) {
-        for hit in self.0[8 * eight..].iter_mut().take(8) {
+    fn give(&mut self, sixteen: usize, _: u32) {
+        for hit in self.0[16 * sixteen..].iter_mut().take(16) {
             *hit = Hit::MISS;
         }
     }
@@ -81,7 +81,7 @@ thread_local! {
 
 /// Traces rays through some ground and gives an answer for each.
 #[inline(always)]
-fn trace<S: Simd, M: Mode, G: Ground, A: ByEights>(
+fn trace<S: Simd, M: Mode, G: Ground, A: BySixteens>(
     resident: &Resident<'_, M::Record>,
     ground: &G,
     rays: Source<'_>,
@@ -99,25 +99,26 @@ fn trace<S: Simd, M: Mode, G: Ground, A: ByEights>(
     let room = &mut *boxed;
     let mut pairs = Pairs::NONE;
     let is_scaled = !resident.scale().is_none();
-    let eights = rays.places().div_ceil(8);
-    for first in (0..eights).step_by(LOT / 8) {
-        let eights = first..eights.min(first + LOT / 8);
+    let sixteens = rays.places().div_ceil(16);
+    for first in (0..sixteens).step_by(LOT / 16) {
+        let sixteens = first..sixteens.min(first + LOT / 16);
         if is_scaled {
-            room.rays.lot.leave(rays, eights.clone());
+            room.rays.lot.leave(rays, sixteens.clone());
         } else {
-            if G::SHEARS {
-                room.rays.lot.prepare::<S::F8, true>(rays, eights.clone(), resident.bounds());
-            } else {
-                room.rays.lot.prepare::<S::F8, false>(rays, eights.clone(), resident.bounds());
+            let (lot, bounds) = (&mut room.rays.lot, resident.bounds());
+            match (G::SHEARS, A::ANY) {
+                (true, true) => lot.prepare::<S::F16, true, true>(rays, sixteens.clone(), bounds),
+                (true, false) => lot.prepare::<S::F16, true, false>(rays, sixteens.clone(), bounds),
+                (false, _) => lot.prepare::<S::F16, false, false>(rays, sixteens.clone(), bounds),
             }
-            let at = At { resident, rays, place: 8 * first };
+            let at = At { resident, rays, place: 16 * first };
             if A::ANY {
                 walk::<S, M, G, true>(&at, ground, room);
             } else {
                 walk::<S, M, G, false>(&at, ground, room);
             }
         }
-        give::<S, M, A>(resident, rays, eights, &mut room.rays, &mut pairs, answers);
+        give::<S, M, A>(resident, rays, sixteens, &mut room.rays, &mut pairs, answers);
     }
     answers.finish::<S, M>(resident, rays, &mut pairs);
     ROOM.set(Some(boxed));
@@ -147,9 +148,10 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, gr
     let (mut waiting, mut fetched) = (0u32, 0u32);
     let mut begin = 0;
     for octant in 0..8 {
-        let ids = rays.lot.octant(octant);
+        let of_octant = rays.lot.octant(octant);
+        let ids = of_octant.ids();
         heads[octant].push(0, begin, ids.len());
-        begin = entries.begin(ids, &rays.lot, begin);
+        begin = entries.begin(ids, of_octant.intervals(), begin);
         waiting |= u32::from(!ids.is_empty()) << octant;
     }
     while waiting != 0 {
@@ -167,11 +169,11 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, gr
             if !ground.is_leaf(list.exit) {
                 let lot = &rays.lot;
                 if list.len == 1 {
-                    ground.take_one::<S::F8>(lot, entries, heads, &list);
+                    ground.take_one::<S::F8, ANY>(lot, entries, heads, &list);
                 } else if wide {
-                    ground.cut::<16, S::F16, S::F8>(octant, lot, entries, heads, &list);
+                    ground.cut::<16, S::F16, S::F8, ANY>(octant, lot, entries, heads, &list);
                 } else {
-                    ground.cut::<8, S::F8, S::F8>(octant, lot, entries, heads, &list);
+                    ground.cut::<8, S::F8, S::F8, ANY>(octant, lot, entries, heads, &list);
                 }
                 ground.fetch(heads.top());
             } else if G::FETCHES && fetched >> octant & 1 == 0 {
@@ -196,42 +198,45 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, gr
     }
 }
 
-/// Gives the answers of a lot's rays, those of some eights, but for pairs of rays and triangles that wait.
+/// Gives the answers of a lot's rays, those of some sixteens, but for pairs of rays and triangles that wait.
 #[inline(always)]
-fn give<S: Simd, M: Mode, A: ByEights>(
+fn give<S: Simd, M: Mode, A: BySixteens>(
     resident: &Resident<'_, M::Record>,
     rays: Source<'_>,
-    eights: Range<usize>,
+    sixteens: Range<usize>,
     Rays { lot, candidates, .. }: &mut Rays,
     pairs: &mut Pairs,
     answers: &mut A,
 ) {
-    let place = 8 * eights.start;
-    for (of_lot, eight) in eights.enumerate() {
-        let closest = lot.closest::<S::F8>(of_lot);
-        answers.give(eight, &closest);
-        let mut found = if A::ANY { 0 } else { closest.found() & 0xff };
-        let primitives = closest.primitives();
-        while found != 0 {
-            let lane = found.trailing_zeros() as usize & 7;
-            found &= found - 1;
-            if pairs.put_one(8 * eight + lane, primitives[lane], resident.tree.triangles()) {
-                answers.answer::<S, M>(resident, rays, pairs);
+    let (place, triangles) = (16 * sixteens.start, resident.tree.triangles());
+    for (of_lot, sixteen) in sixteens.enumerate() {
+        if A::ANY {
+            answers.give(sixteen, lot.done(of_lot));
+        } else {
+            answers.give(sixteen, 0);
+            let (mut found, mut places) = (0, [0; 16]);
+            let primitives = lot.primitives(of_lot);
+            for lane in 0..16 {
+                places[lane] = (16 * sixteen + lane) as i32;
+                found |= u32::from(primitives[lane] != NONE) << lane;
             }
+            pairs.put::<S::F16>(&places, &primitives, found, triangles);
+            answers.answer_if_many::<S, M>(resident, rays, pairs);
         }
         let mut odd = lot.odd(of_lot);
         while odd != 0 {
-            let lane = odd.trailing_zeros() as usize & 7;
+            let lane = odd.trailing_zeros() as usize & 15;
             odd &= odd - 1;
-            let place = 8 * eight + lane;
+            let place = 16 * sixteen + lane;
             answers.odd::<M>(resident, place, &rays.ray(place));
         }
     }
-    for (id, primitive) in candidates.take(lot) {
-        if pairs.put_one(place + Lot::place(id), primitive, resident.tree.triangles()) {
-            answers.answer::<S, M>(resident, rays, pairs);
-        }
+    for row in 0..candidates.rows() {
+        let (places, primitives, bits) = candidates.row::<S::F16>(row, lot, place);
+        pairs.put::<S::F16>(&places, primitives, bits, triangles);
+        answers.answer_if_many::<S, M>(resident, rays, pairs);
     }
+    candidates.clear();
 }
 
 #[cfg(test)]

@@ -29,10 +29,11 @@ impl Seen {
     fn see<const W: usize, L: Dense<W>>(&mut self, rays: &Listed<W, L>, chunk: Chunk<'_>) {
         let rows = [chunk.row(0), chunk.row(1), chunk.row(2)];
         for (vertex, seen) in self.0.iter_mut().enumerate().take(chunk.vertices()) {
-            let numbers = rays.see(&[rows[0][vertex], rows[1][vertex], rows[2][vertex]]);
-            for (row, number) in seen.iter_mut().zip(numbers) {
-                *row.first_chunk_mut().expect("a row holds a register") = number.store();
-            }
+            let [x, y, depth] = rays.see(&[rows[0][vertex], rows[1][vertex], rows[2][vertex]]);
+            let (room, [to_x, to_y, to_depth]) = ("a row holds a register", seen);
+            *to_x.first_chunk_mut().expect(room) = x.store();
+            *to_y.first_chunk_mut().expect(room) = y.store();
+            *to_depth.first_chunk_mut().expect(room) = depth.store();
         }
     }
 
@@ -68,16 +69,18 @@ pub fn meet_one<L: Sixteen, M: Mode, const ANY: bool>(
     let (pooled, [tnear, before]) = lot.pooled(id);
     let mut closest = before;
     // (What is done ends before anything.)
-    if closest < tmin {
+    if closest < if ANY { tnear } else { tmin } {
         return;
     }
     for chunk in chunks {
         let Prospects { possible, certain, first, last } = prospects::<L, M>(&pooled, chunk, tnear, closest);
         if ANY && certain.any() {
-            lot.keep_one(id, f32::NEG_INFINITY, chunk.ids()[0]);
+            lot.end(id);
             return;
         }
-        closest = L::select(certain, last, L::splat(closest)).least();
+        if !ANY {
+            closest = L::select(certain, last, L::splat(closest)).least();
+        }
         candidates.add(possible.bits(), L::ids(id), L::ids_load(chunk.ids()), first);
     }
     // What was found beyond does not count any more.
@@ -100,6 +103,7 @@ pub fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
     for done in (0..len).step_by(W) {
         let (ids, tmin) = entries.starts::<W, L>(at + done);
         let (rays, [tnear, before]) = lot.listed::<W, L>(&ids);
+        let tmin = if ANY { tnear } else { tmin };
         let mut live = tmin.le(before).bits() & present((len - done).min(W));
         if live == 0 {
             continue;
@@ -147,7 +151,10 @@ pub fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
             }
         }
         if ANY {
-            lot.keep_each(&ids, changed, |_| (f32::NEG_INFINITY, 0));
+            while changed != 0 {
+                lot.end(ids[changed.trailing_zeros() as usize % W]);
+                changed &= changed - 1;
+            }
         } else if changed != 0 {
             let closest = closest.store();
             lot.keep_each(&ids, changed, |lane| (closest[lane], NONE));

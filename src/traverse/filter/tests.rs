@@ -12,6 +12,7 @@ use crate::traverse::source::Source;
 use crate::traverse::{Accel, Kernel, RayPacket};
 use glam::Vec3;
 use std::collections::HashSet;
+use std::ops::Range;
 
 /// Numbers between -1 and 1 that look like chance.
 struct Numbers(f64);
@@ -49,6 +50,8 @@ struct Cuts<'a>(&'a Accel, &'a [Ray], Kind);
 enum Kind {
     Lines,
     Boxes,
+    /// Boxes of rays that ask for any hit.
+    BoxesOfAny,
 }
 
 type Waiting = Vec<(i32, i32, [u32; 2])>;
@@ -61,52 +64,57 @@ impl Task for Cuts<'_> {
         let tree = self.0.tree();
         if self.2 == Kind::Lines {
             let lines = (0..tree.lines().len()).map(|line| Exit::of_line(line).0).take(40);
-            self.through::<S, _>(&OfLines(tree), lines)
+            return self.through::<S, _, false>(&OfLines(tree), lines);
+        }
+        // Not many rays come to those that lie deeper.
+        let nodes = (0..4).cycle().take(40);
+        let boxes = OfBoxes(Ways::new(tree.pools().expect("they were made")));
+        if self.2 == Kind::Boxes {
+            self.through::<S, _, false>(&boxes, nodes)
         } else {
-            // Not many rays come to those that lie deeper.
-            let nodes = (0..4).cycle().take(40);
-            self.through::<S, _>(&OfBoxes(Ways::new(tree.pools().expect("they were made"))), nodes)
+            self.through::<S, _, true>(&boxes, nodes)
         }
     }
 }
 
 impl Cuts<'_> {
     #[inline(always)]
-    fn through<S: Simd, G: Ground>(
+    fn through<S: Simd, G: Ground, const ANY: bool>(
         &self,
         ground: &G,
         places: impl Iterator<Item = i32> + Clone,
     ) -> Vec<[Waiting; 3]> {
         let Self(accel, rays, kind) = self;
         let mut lot = Box::new(Lot::new());
-        let eights = 0..rays.len().div_ceil(8);
-        lot.prepare::<S::F8, false>(Source::Slice(rays), eights, accel.tree().bounds());
+        let sixteens = 0..rays.len().div_ceil(16);
+        lot.prepare::<S::F16, false, ANY>(Source::Slice(rays), sixteens, accel.tree().bounds());
         let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
         for octant in 0..8 {
-            let ids = lot.octant(octant);
+            let (ids, [tmin, tmax]) = (lot.octant(octant).ids(), lot.octant(octant).intervals());
             for (i, exit) in places.clone().enumerate() {
                 let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
-                let begin = |entries: &mut Entries| {
-                    entries.begin(&ids[..len], &lot, 0);
-                    List { exit, at: 0, len: len as u32 }
+                let begin = |entries: &mut Entries, rays: Range<usize>| {
+                    let intervals = [&tmin[rays.clone()], &tmax[rays.clone()]];
+                    entries.begin(&ids[rays.clone()], intervals, 0);
+                    List { exit, at: 0, len: rays.len() as u32 }
                 };
-                let list = begin(&mut entries);
-                ground.cut::<8, S::F8, S::F8>(octant, &lot, &mut entries, &mut heads, &list);
+                let list = begin(&mut entries, 0..len);
+                ground.cut::<8, S::F8, S::F8, ANY>(octant, &lot, &mut entries, &mut heads, &list);
                 let by_eights = all(&entries, &mut heads);
-                let list = begin(&mut entries);
-                ground.cut::<16, S::F16, S::F8>(octant, &lot, &mut entries, &mut heads, &list);
+                let list = begin(&mut entries, 0..len);
+                ground.cut::<16, S::F16, S::F8, ANY>(octant, &lot, &mut entries, &mut heads, &list);
                 let by_sixteens = all(&entries, &mut heads);
                 let mut alone = Vec::new();
                 for ray in 0..len {
-                    entries.begin(&ids[ray..=ray], &lot, 0);
-                    let list = List { exit, at: 0, len: 1 };
-                    ground.take_one::<S::F8>(&lot, &mut entries, &mut heads, &list);
+                    let list = begin(&mut entries, ray..ray + 1);
+                    ground.take_one::<S::F8, ANY>(&lot, &mut entries, &mut heads, &list);
                     alone.extend(all(&entries, &mut heads));
                 }
                 found.push([by_eights, by_sixteens, alone].map(|mut all| {
-                    if *kind == Kind::Boxes {
-                        // Where intervals end is not kept.
-                        all.iter_mut().for_each(|(.., [_, tmax])| *tmax = 0);
+                    for (.., [tmin, tmax]) in &mut all {
+                        // What is not kept.
+                        *tmin = if *kind == Kind::BoxesOfAny { 0 } else { *tmin };
+                        *tmax = if *kind == Kind::Lines { *tmax } else { 0 };
                     }
                     all.sort_unstable();
                     all
@@ -162,8 +170,9 @@ fn trees(triangles: usize, seed: u64) -> [Accel; 2] {
 fn a_list_meets_boxes_as_each_of_its_rays_does() {
     let [_, accel] = trees(3000, 1);
     let rays = rays(2000, true, 0.3);
-    for isa in Isa::available() {
-        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays, Kind::Boxes));
+    let kinds = [Kind::Boxes, Kind::BoxesOfAny];
+    for (isa, kind) in Isa::available().into_iter().flat_map(|isa| kinds.map(|kind| (isa, kind))) {
+        let found = Chosen::new(isa).expect("it is available").run(Cuts(&accel, &rays, kind));
         let (mut all, mut other) = (0, 0);
         for (i, [by_eights, by_sixteens, alone]) in found.into_iter().enumerate() {
             assert_eq!(by_eights, by_sixteens, "{isa}, node {i}");

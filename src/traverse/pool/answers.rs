@@ -15,7 +15,7 @@ use crate::traverse::stream::{Answers, Any, Closest, OneByOne};
 
 /// Triangles that wait, and the ray of each.
 pub struct Pairs {
-    rays: [u32; ROOM + 2 * MOST],
+    rays: [i32; ROOM + 2 * MOST],
     primitives: [i32; ROOM + 2 * MOST],
     count: usize,
 }
@@ -28,9 +28,9 @@ impl Pairs {
 
     /// Puts the triangles there that a ray may hit, and fetches the records of the first two.
     #[inline(always)]
-    fn put<L: Sixteen>(&mut self, flight: &Flight, records: &[Triangle]) {
+    fn put_all<L: Sixteen>(&mut self, flight: &Flight, records: &[Triangle]) {
         let place = self.count.min(ROOM);
-        self.rays[place..][..2 * MOST].fill(flight.ray);
+        self.rays[place..][..2 * MOST].fill(flight.ray as i32);
         let primitives = self.primitives[place..].first_chunk_mut().expect("room for a list");
         self.count = place + flight.listed::<L>(primitives);
         for primitive in &self.primitives[place..][..2] {
@@ -38,14 +38,24 @@ impl Pairs {
         }
     }
 
-    /// Puts one there, and fetches its record. Says whether enough wait to be answered.
+    /// Puts those of some rays and triangles there whose bits are set, and fetches their records.
     #[inline(always)]
-    pub fn put_one(&mut self, ray: usize, primitive: i32, records: &[Triangle]) -> bool {
+    pub fn put<L: Sixteen>(
+        &mut self,
+        rays: &[i32; MOST],
+        primitives: &[i32; MOST],
+        bits: u32,
+        records: &[Triangle],
+    ) {
         let place = self.count.min(ROOM);
-        (self.rays[place], self.primitives[place]) = (ray as u32, primitive);
-        prefetch_both(records.as_ptr().wrapping_add(primitive as usize));
-        self.count = place + 1;
-        self.count > ROOM
+        let room = "room for a list";
+        L::ids_compact(L::ids_load(rays), bits, self.rays[place..].first_chunk_mut().expect(room));
+        let to = self.primitives[place..].first_chunk_mut().expect(room);
+        L::ids_compact(L::ids_load(primitives), bits, to);
+        self.count = place + bits.count_ones() as usize;
+        for primitive in &self.primitives[place..self.count] {
+            prefetch_both(records.as_ptr().wrapping_add(*primitive as usize));
+        }
     }
 
     /// Takes out the first sixteen.
@@ -128,6 +138,19 @@ pub trait Told: Answers {
         pairs.shift();
     }
 
+    /// Answers some, unless those that wait are few.
+    #[inline(always)]
+    fn answer_if_many<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &mut Pairs,
+    ) {
+        while pairs.count > ROOM {
+            self.answer::<S, M>(tree, rays, pairs);
+        }
+    }
+
     /// Answers all that wait.
     #[inline(always)]
     fn finish<S: Simd, M: Mode>(
@@ -160,10 +183,8 @@ pub trait OfFlights: Told + OneByOne {
         pairs: &mut Pairs,
     ) {
         self.missed(flight.ray as usize);
-        pairs.put::<S::F16>(flight, tree.tree.triangles());
-        while pairs.count > ROOM {
-            self.answer::<S, M>(tree, rays, pairs);
-        }
+        pairs.put_all::<S::F16>(flight, tree.tree.triangles());
+        self.answer_if_many::<S, M>(tree, rays, pairs);
     }
 
     /// Answers a ray that has ended and is alone.

@@ -25,7 +25,7 @@ impl Starts {
     #[inline(always)]
     pub fn new<L: Eight>(rays: &[Ray], bounds: &Aabb) -> Self {
         let present = (1u32 << rays.len().min(8)) - 1;
-        let [[x, y, z, tnear], [dx, dy, dz, tfar]] = columns::<L>(rays);
+        let [[x, y, z, tnear], [dx, dy, dz, tfar]] = columns::<8, L>(rays);
         let origin = [x, y, z];
         let Ready { inverse, reach, margin, closest, ordinary, flies, .. } =
             Ready::new(&origin, &[dx, dy, dz], tnear, tfar, bounds);

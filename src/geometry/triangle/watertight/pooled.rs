@@ -20,7 +20,7 @@
 
 use super::{Shear, edges, one_sign};
 use crate::geometry::triangle::{Lanes3, RENAMED, Test};
-use crate::simd::{Lanes, Mask, Sixteen};
+use crate::simd::{Lanes, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
 const SLACK: f32 = 1.0 / (1 << 18) as f32;
@@ -142,16 +142,15 @@ impl Pooled {
     }
 }
 
-/// What is kept of rays for [`Pooled`] and [`Listed`]: their shears, and a bit for each whose greatest axis is x, and for
-/// each where it is y.
+/// What is kept of rays for [`Pooled`] and [`Listed`]: their shears, and which rays have x for the greatest axis, and which y.
 #[inline(always)]
 pub fn shears<const W: usize, L: Lanes<W>>(
     origin: &Lanes3<L>,
     direction: &Lanes3<L>,
-) -> (Lanes3<L>, [u32; 2]) {
+) -> (Lanes3<L>, [L::Mask; 2]) {
     // (As if no lane mattered: so nobody asks whether all have the same.)
     let Shear { shear, major_x, major_y, .. } = Shear::<W, L>::new(origin, direction, 0);
-    (shear, [major_x.bits(), major_y.bits()])
+    (shear, [major_x, major_y])
 }
 
 /// Rays as pools see them that meet triangles together.
@@ -253,7 +252,7 @@ mod tests {
     use super::*;
     use crate::geometry::triangle::exact::Filter;
     use crate::geometry::triangle::{Candidate, Corners, Triangle};
-    use crate::simd::{Chosen, Isa, Simd, Task};
+    use crate::simd::{Chosen, Isa, Mask, Simd, Task};
     use crate::weyl::uniform;
     use proptest::prelude::*;
     use std::array::from_fn;
@@ -286,7 +285,7 @@ mod tests {
             let lanes = |v: &[f32; 3]| [turned(v, 0), turned(v, 1), turned(v, 2)];
             let (origins, directions) = (lanes(origin), lanes(direction));
             let (shear, axes) = shears::<W, L>(&origins, &directions);
-            let listed = Listed::<W, L>::new(&origins, shear, axes.map(L::mask_from_bits), reach);
+            let listed = Listed::<W, L>::new(&origins, shear, axes, reach);
             let (mut all, lane) = ((0, 0, [0.0; 16], [0.0; 16]), W / 3 * 3 - 1);
             for (i, corners) in triangles.iter().enumerate() {
                 let corners = [listed.see(&corners[0]), listed.see(&corners[1]), listed.see(&corners[2])];
