@@ -17,8 +17,9 @@
 //! 4. What rays have found shortens them; rays that nothing is left of drop out of lists as these are cut.
 //!
 //! What lists go through is their [`ground`]. Where [`Pools`](crate::kdtree::Pools) have been made it is nodes of eight
-//! boxes, to which a list is put one box after the other ([`boxes`]), and pools, whose triangles a list meets as those of
-//! other leaves, and one or two rays sixteen at a time ([`pool`]).
+//! boxes, to which a list is put one box after the other ([`boxes`]), and pools ([`pool`]). There the mode's test is not asked
+//! on the way: what a ray may hit is kept among the lot's [`candidates`] until the lot has ended, as in a
+//! [stream](crate::traverse::pool), so that no triangle's record is fetched before.
 //!
 //! Cells have thick walls as in `walk.rs`, a leaf's triangles go through the mode's own test, and the least
 //! `(t, primitive id)` counts: hits are those of the packet kernels, bit for bit. Rays that are not

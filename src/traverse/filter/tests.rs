@@ -5,6 +5,7 @@ use super::lists::{Entries, Heads, List};
 use super::lot::{LOT, Lot};
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, Exit, Tree};
+use crate::mesh::Mesh;
 use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, Task};
 use crate::traverse::pool::ways::Ways;
@@ -248,6 +249,35 @@ fn every_ray_of_every_lot_is_answered_as_alone() {
     let mut hits = vec![Hit::MISS; LOT];
     trees[0].intersect_many(Kernel::Filter, &sets[1], &mut hits);
     assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 100, "there is something to hit");
+}
+
+#[test]
+fn rays_that_may_hit_more_than_can_wait_are_answered_as_alone() {
+    // Triangles in one place: a ray that hits one for certain, or passes through an edge or a corner, may hit all of them.
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]; 60], ..Mesh::default() };
+    let accel = Accel::build(&mesh, &BuildParams::default()).expect("builds");
+    accel.make_pools().expect("all is in memory");
+    let rays: Vec<Ray> = (0..LOT)
+        .map(|i| {
+            let (x, y) = ((i % 64) as f32 / 63.0, (i / 64) as f32 / 128.0);
+            Ray::new(Vec3::new(x, if i % 2 == 0 { 0.0 } else { y }, 1.0), Vec3::NEG_Z)
+        })
+        .collect();
+    for isa in Isa::available() {
+        for accuracy in [Accuracy::Watertight, Accuracy::Exact] {
+            let accel = accel.clone().with_isa(isa).with_accuracy(accuracy);
+            let (mut alone, mut hits) = (vec![Hit::MISS; LOT], vec![Hit::MISS; LOT]);
+            accel.intersect_many(Kernel::Single, &rays, &mut alone);
+            accel.intersect_many(Kernel::Filter, &rays, &mut hits);
+            assert!(hits == alone, "{isa}, {accuracy}");
+            let mut occluded = vec![false; LOT];
+            accel.occluded_many(Kernel::Filter, &rays, &mut occluded);
+            assert!(occluded.iter().zip(&alone).all(|(&occluded, hit)| occluded == hit.is_hit()));
+            let found = hits.iter().filter(|hit| hit.is_hit()).count();
+            assert!((3000..LOT).contains(&found), "{found} hits");
+        }
+    }
 }
 
 #[test]
