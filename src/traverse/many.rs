@@ -7,6 +7,14 @@ use super::tile::{PACKETS, WIDE};
 use super::width::PacketWidth;
 use crate::geometry::{Hit, Ray};
 
+/// So many rays at once have numbers of 31 bits, which streams and lists give them.
+const NUMBERED: usize = 1 << 30;
+
+/// Rays and their answers, as many at a time as have numbers.
+fn numbered<'a, A>(rays: &'a [Ray], answers: &'a mut [A]) -> impl Iterator<Item = (&'a [Ray], &'a mut [A])> {
+    rays.chunks(NUMBERED).zip(answers.chunks_mut(NUMBERED))
+}
+
 impl Accel {
     /// The closest hit of each ray, by the kernel named: for packets, rays that follow one
     /// another go together. Panics if the slices' lengths differ.
@@ -22,9 +30,13 @@ impl Accel {
             Kernel::Packet8 => self.intersect_slices::<8>(rays, hits),
             Kernel::Packet16 => self.intersect_slices::<16>(rays, hits),
             Kernel::Stream if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
-            Kernel::Stream => self.intersect_streaming(rays, hits),
+            Kernel::Stream => {
+                numbered(rays, hits).for_each(|(rays, hits)| self.intersect_streaming(rays, hits));
+            }
             Kernel::Filter if self.cached().is_some() => self.intersect_slices::<8>(rays, hits),
-            Kernel::Filter => self.intersect_filtered(rays, hits),
+            Kernel::Filter => {
+                numbered(rays, hits).for_each(|(rays, hits)| self.intersect_filtered(rays, hits));
+            }
             Kernel::Tile => self.intersect_tiles::<1>(rays, hits),
             Kernel::WideTile => self.intersect_tiles::<WIDE>(rays, hits),
         }
@@ -44,9 +56,13 @@ impl Accel {
             Kernel::Packet8 => self.occluded_slices::<8>(rays, occluded),
             Kernel::Packet16 => self.occluded_slices::<16>(rays, occluded),
             Kernel::Stream if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
-            Kernel::Stream => self.occluded_streaming(rays, occluded),
+            Kernel::Stream => {
+                numbered(rays, occluded).for_each(|(rays, found)| self.occluded_streaming(rays, found));
+            }
             Kernel::Filter if self.cached().is_some() => self.occluded_slices::<8>(rays, occluded),
-            Kernel::Filter => self.occluded_filtered(rays, occluded),
+            Kernel::Filter => {
+                numbered(rays, occluded).for_each(|(rays, found)| self.occluded_filtered(rays, found));
+            }
             Kernel::Tile | Kernel::WideTile => self.occluded_tiles(rays, occluded),
         }
     }

@@ -6,7 +6,7 @@ use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::Pools;
 use crate::simd::Simd;
-use crate::traverse::pool::answers::{Met16, Pairs, Told};
+use crate::traverse::pool::answers::Told;
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
@@ -87,28 +87,18 @@ impl Answers for Found<'_> {
     fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
         let mut found = [false];
         Any(&mut found).odd::<M>(tree, 0, ray);
-        match self {
-            Self::Rays(rays) => [rays[number]] = found,
-            Self::Lanes(lanes) => lanes[number / 16] |= u32::from(found[0]) << (number % 16),
+        if found[0] {
+            self.hits(number);
         }
     }
 }
 
 impl Told for Found<'_> {
     #[inline(always)]
-    fn tell<S: Simd, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        pairs: &Pairs,
-        count: usize,
-        found: &Met16<S::F16>,
-    ) {
-        for ray in found.rays::<M>(tree, rays, pairs, count) {
-            match self {
-                Self::Rays(rays) => rays[ray] = true,
-                Self::Lanes(lanes) => lanes[ray / 16] |= 1 << (ray % 16),
-            }
+    fn hits(&mut self, ray: usize) {
+        match self {
+            Self::Rays(rays) => rays[ray] = true,
+            Self::Lanes(lanes) => lanes[ray / 16] |= 1 << (ray % 16),
         }
     }
 }

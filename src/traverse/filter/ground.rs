@@ -56,16 +56,16 @@ pub trait Ground {
     fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
         &self,
         resident: &Resident<'_, M::Record>,
-        room: &mut Rays,
+        rays: &mut Rays,
         entries: &Entries,
         list: &List,
     );
 
     /// The same ray by ray.
-    fn meet_few<L: Sixteen, M: Mode, const ANY: bool>(&self, room: &mut Rays, entries: &Entries, list: &List);
+    fn meet_few<L: Sixteen, M: Mode, const ANY: bool>(&self, rays: &mut Rays, entries: &Entries, list: &List);
 }
 
-/// A lot's rays, and what they may hit.
+/// A lot's rays, what they may hit, and how some of them see the triangles of a chunk.
 pub struct Rays {
     pub lot: Lot,
     pub candidates: Candidates,
@@ -148,9 +148,6 @@ impl Ground for OfLines<'_> {
 /// Nodes of boxes, and pools.
 pub struct OfBoxes<'a>(pub Ways<'a>);
 
-/// What few rays are in a pool: by themselves they meet its triangles all at once.
-const FEW: u32 = 3;
-
 impl OfBoxes<'_> {
     /// The chunks of the pool that a list is in.
     #[inline(always)]
@@ -182,7 +179,7 @@ impl<'a> Iterator for Chunks<'a> {
 }
 
 impl Ground for OfBoxes<'_> {
-    const FEW: u32 = FEW;
+    const FEW: u32 = 3;
     const SHEARS: bool = true;
     const FETCHES: bool = false;
 

@@ -171,9 +171,8 @@ impl Entries {
     /// The same without the ends of the intervals, for who does not ask for them.
     #[inline(always)]
     pub fn write_starts<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids, tmin: L) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        L::close_up_ids(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
-        tmin.close_up(bits, self.tmin[at..].first_chunk_mut().expect(room));
+        self.write_ids::<W, L>(at, bits, ids);
+        tmin.close_up(bits, self.tmin[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
     }
 
     /// The same without intervals.
@@ -183,17 +182,16 @@ impl Entries {
         L::close_up_ids(ids, bits, to);
     }
 
+    /// Writes where one ray begins, at several places: those of a register whose bits are set.
+    #[inline(always)]
+    pub fn write_starts_of<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L) {
+        self.write_id(at, id);
+        tmin.compact(bits, self.tmin[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
+    }
+
     /// Writes one ray's number at eight places.
     #[inline(always)]
     pub fn write_id(&mut self, at: usize, id: i32) {
         *self.ids[at % ENTRIES..].first_chunk_mut().expect("a register behind each") = [id; 8];
-    }
-
-    /// The same of one ray, which begins at several places.
-    #[inline(always)]
-    pub fn write_starts_of<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        *self.ids[at..].first_chunk_mut().expect(room) = [id; 8];
-        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
     }
 }

@@ -213,7 +213,7 @@ impl Lot {
         let nowhere = &[0.0; 4];
         let (mut starts, mut inverses) = ([nowhere; W], [nowhere; W]);
         for lane in 0..W {
-            let traveller = &self.travellers[ids[lane] as usize % LOT];
+            let traveller = &self.travellers[Self::place(ids[lane])];
             (starts[lane], inverses[lane]) = (&traveller.start, &traveller.inverse);
         }
         let [x, y, z, closest] = L::columns(&starts);
@@ -226,7 +226,7 @@ impl Lot {
     /// A ray as a line's planes see it, and where it ends.
     #[inline(always)]
     pub fn planes<L: Eight>(&self, id: i32, line: &Line) -> (Planes<L>, f32) {
-        let traveller = &self.travellers[id as usize % LOT];
+        let traveller = &self.travellers[Self::place(id)];
         let exits = L::ids_load(&line.exits);
         let origin = L::of_fours([&traveller.start; 2]).pick_in_fours(exits);
         let inverse = L::of_fours([&traveller.inverse; 2]).pick_in_fours(exits);
@@ -238,7 +238,7 @@ impl Lot {
     #[inline(always)]
     pub fn slabs(&self, id: i32) -> (Slabs, f32) {
         let Traveller { start: [x, y, z, closest], inverse: [by_x, by_y, by_z, _] } =
-            self.travellers[id as usize % LOT];
+            self.travellers[Self::place(id)];
         let inverse = [by_x, by_y, by_z];
         let margin = inverse.map(|inverse| self.thickness * inverse.abs());
         (Slabs::new(&[x, y, z], &inverse, &margin), closest)
@@ -247,7 +247,7 @@ impl Lot {
     /// Where a ray begins, if that is kept with it.
     #[inline(always)]
     pub fn begin(&self, id: i32) -> f32 {
-        self.travellers[id as usize % LOT].inverse[3]
+        self.travellers[Self::place(id)].inverse[3]
     }
 
     /// How far the scene reaches from any of the rays.
@@ -259,7 +259,7 @@ impl Lot {
     /// A sheared ray as pools see it, and between which ends it looks for hits.
     #[inline(always)]
     pub fn pooled(&self, id: i32) -> (Pooled, [f32; 2]) {
-        let place = id as usize % LOT;
+        let place = Self::place(id);
         let Traveller { start: [x, y, z, closest], .. } = self.travellers[place];
         let [sx, sy, scale, tnear] = self.ways[place];
         let axis = (id / AXIS) as usize;
@@ -270,13 +270,12 @@ impl Lot {
     #[inline(always)]
     pub fn listed<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> (Listed<W, L>, [L; 2]) {
         let nowhere = &[0.0; 4];
-        let (mut starts, mut ways) = ([nowhere; W], [nowhere; W]);
+        let mut starts = [nowhere; W];
         for lane in 0..W {
-            let place = ids[lane] as usize % LOT;
-            (starts[lane], ways[lane]) = (&self.travellers[place].start, &self.ways[place]);
+            starts[lane] = &self.travellers[Self::place(ids[lane])].start;
         }
         let [x, y, z, closest] = L::columns(&starts);
-        let [sx, sy, scale, tnear] = L::columns(&ways);
+        let [sx, sy, scale, tnear] = self.ways::<W, L>(ids);
         let ids = L::ids_of(ids);
         let axes = [L::ids_less(ids, L::ids(AXIS)), L::ids_less(ids, L::ids(2 * AXIS))];
         (Listed::new(&[x, y, z], [sx, sy, scale], axes, self.reach()), [tnear, closest])
@@ -285,20 +284,20 @@ impl Lot {
     /// What a ray has found: what a hit must not lie beyond, and a triangle's id, or [`NONE`].
     #[inline(always)]
     pub fn found_by(&self, id: i32) -> (f32, i32) {
-        let traveller = &self.travellers[id as usize % LOT];
+        let traveller = &self.travellers[Self::place(id)];
         (traveller.start[3], traveller.inverse[3].to_bits() as i32)
     }
 
     /// A ray that asks for any hit is done.
     #[inline(always)]
     pub fn end(&mut self, id: i32) {
-        self.travellers[id as usize % LOT].start[3] = DONE;
+        self.travellers[Self::place(id)].start[3] = DONE;
     }
 
     /// Keeps what a ray has found.
     #[inline(always)]
     pub fn keep_one(&mut self, id: i32, t: f32, primitive: i32) {
-        let traveller = &mut self.travellers[id as usize % LOT];
+        let traveller = &mut self.travellers[Self::place(id)];
         traveller.start[3] = t;
         traveller.inverse[3] = f32::from_bits(primitive as u32);
     }
@@ -310,7 +309,7 @@ impl Lot {
         let mut starts = [nowhere; W];
         let mut primitives = [0; W];
         for lane in 0..W {
-            let traveller = &self.travellers[ids[lane] as usize % LOT];
+            let traveller = &self.travellers[Self::place(ids[lane])];
             starts[lane] = &traveller.start;
             primitives[lane] = traveller.inverse[3].to_bits() as i32;
         }
@@ -323,7 +322,7 @@ impl Lot {
     pub fn ways<const W: usize, L: Dense<W>>(&self, ids: &[i32; W]) -> [L; 4] {
         let mut ways = [&[0.0; 4]; W];
         for lane in 0..W {
-            ways[lane] = &self.ways[ids[lane] as usize % LOT];
+            ways[lane] = &self.ways[Self::place(ids[lane])];
         }
         L::columns(&ways)
     }

@@ -76,7 +76,7 @@ pub struct Met16<L: Sixteen> {
 impl<L: Sixteen> Met16<L> {
     /// The rays that hit their triangles, of the first `count` that wait.
     #[inline(always)]
-    pub fn rays<M: Mode>(
+    fn rays<M: Mode>(
         &self,
         tree: &Resident<'_, M::Record>,
         rays: Source<'_>,
@@ -97,7 +97,11 @@ impl<L: Sixteen> Met16<L> {
 
 /// Where the answers of rays go that may hit some triangles.
 pub trait Told: Answers {
+    /// A ray hits something. Where the closest hits are wanted, that says nothing.
+    fn hits(&mut self, ray: usize);
+
     /// Takes up what rays found of a triangle each, of the first `count` that wait.
+    #[inline(always)]
     fn tell<S: Simd, M: Mode>(
         &mut self,
         tree: &Resident<'_, M::Record>,
@@ -105,7 +109,11 @@ pub trait Told: Answers {
         pairs: &Pairs,
         count: usize,
         found: &Met16<S::F16>,
-    );
+    ) {
+        for ray in found.rays::<M>(tree, rays, pairs, count) {
+            self.hits(ray);
+        }
+    }
 
     /// Answers the first sixteen that wait.
     #[inline(always)]
@@ -170,9 +178,6 @@ pub trait Told: Answers {
 
 /// Where the answers of rays in flight go.
 pub trait OfFlights: Told + OneByOne {
-    /// A ray hits something for certain, of any.
-    fn hits(&mut self, ray: usize);
-
     /// A ray has ended.
     #[inline(always)]
     fn end<S: Simd, M: Mode>(
@@ -192,6 +197,9 @@ pub trait OfFlights: Told + OneByOne {
 }
 
 impl Told for Closest<'_> {
+    #[inline(always)]
+    fn hits(&mut self, _ray: usize) {}
+
     #[inline(always)]
     fn tell<S: Simd, M: Mode>(
         &mut self,
@@ -233,9 +241,6 @@ impl Told for Closest<'_> {
 }
 
 impl OfFlights for Closest<'_> {
-    #[inline(always)]
-    fn hits(&mut self, _ray: usize) {}
-
     #[inline(always)]
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
         let nearest = flight.nearest::<M>(tree.records, ray);
@@ -280,26 +285,12 @@ fn hit_of<M: Mode>(tree: &Resident<'_, M::Record>, primitive: u32, candidate: &C
 
 impl Told for Any<'_> {
     #[inline(always)]
-    fn tell<S: Simd, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        pairs: &Pairs,
-        count: usize,
-        found: &Met16<S::F16>,
-    ) {
-        for ray in found.rays::<M>(tree, rays, pairs, count) {
-            self.0[ray] = true;
-        }
+    fn hits(&mut self, ray: usize) {
+        self.0[ray] = true;
     }
 }
 
 impl OfFlights for Any<'_> {
-    #[inline(always)]
-    fn hits(&mut self, ray: usize) {
-        self.0[ray] = true;
-    }
-
     #[inline(always)]
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
         self.0[flight.ray as usize] = flight.nearest::<M>(tree.records, ray).is_some();

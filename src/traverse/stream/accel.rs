@@ -28,7 +28,6 @@ struct Stream<'a, A> {
 impl<A: OneByOne> ResidentQuery for Stream<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        // Rays have numbers of 32 bits.
         trace::<S, M, A>(tree, self.rays, &mut self.answers);
     }
 }
