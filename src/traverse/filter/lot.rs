@@ -250,12 +250,6 @@ impl Lot {
         self.travellers[Self::place(id)].inverse[3]
     }
 
-    /// How far the scene reaches from any of the rays.
-    #[inline(always)]
-    fn reach(&self) -> f32 {
-        self.thickness / MARGIN
-    }
-
     /// A sheared ray as pools see it, and between which ends it looks for hits.
     #[inline(always)]
     pub fn pooled(&self, id: i32) -> (Pooled, [f32; 2]) {
@@ -263,7 +257,7 @@ impl Lot {
         let Traveller { start: [x, y, z, closest], .. } = self.travellers[place];
         let [sx, sy, scale, tnear] = self.ways[place];
         let axis = (id / AXIS) as usize;
-        (Pooled::of_shear(&[x, y, z], [sx, sy, scale], axis, self.reach()), [tnear, closest])
+        (Pooled::of_shear(&[x, y, z], [sx, sy, scale], axis), [tnear, closest])
     }
 
     /// Sheared rays likewise.
@@ -278,7 +272,7 @@ impl Lot {
         let [sx, sy, scale, tnear] = self.ways::<W, L>(ids);
         let ids = L::ids_of(ids);
         let axes = [L::ids_less(ids, L::ids(AXIS)), L::ids_less(ids, L::ids(2 * AXIS))];
-        (Listed::new(&[x, y, z], [sx, sy, scale], axes, self.reach()), [tnear, closest])
+        (Listed::new(&[x, y, z], [sx, sy, scale], axes), [tnear, closest])
     }
 
     /// What a ray has found: what a hit must not lie beyond, and a triangle's id, or [`NONE`].

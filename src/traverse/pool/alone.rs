@@ -33,7 +33,7 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     } else {
         let slabs = Slabs::new(&origin, &ready.inverse, &ready.margin);
         let mut flight = Flight::NONE;
-        flight.begin(slabs, [ready.reach, ready.closest], ray, 0);
+        flight.begin(slabs, ready.closest, ray, 0);
         with_stacks(
             #[inline(always)]
             |[waiting, ..]| {

@@ -59,9 +59,9 @@ impl Flight {
 
     /// Becomes a ray that has found nothing.
     #[inline(always)]
-    pub fn begin(&mut self, slabs: Slabs, [reach, tfar]: [f32; 2], ray: &Ray, number: usize) {
+    pub fn begin(&mut self, slabs: Slabs, tfar: f32, ray: &Ray, number: usize) {
         self.slabs = slabs;
-        self.pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array(), reach);
+        self.pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array());
         (self.top, self.ray, self.count) = (1, number as u32, 0);
         (self.tnear, self.tfar) = (ray.tnear, tfar);
     }

@@ -88,7 +88,7 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
                     answers.missed(number);
                 } else {
                     let k = free.pop().expect("as many as rays");
-                    flights[k].begin(starts.slabs(lane), starts.reach_and_tfar(lane), ray, number);
+                    flights[k].begin(starts.slabs(lane), starts.tfar(lane), ray, number);
                     stacks[k].begin();
                     at_node.put_if(k, true);
                 }

@@ -12,7 +12,6 @@ pub struct Starts {
     near: [[f32; 8]; 3],
     far: [[f32; 8]; 3],
     octants: [u32; 8],
-    reach: [f32; 8],
     tfar: [f32; 8],
     /// Rays that meet the bounds.
     pub flies: u32,
@@ -27,7 +26,7 @@ impl Starts {
         let present = (1u32 << rays.len().min(8)) - 1;
         let [[x, y, z, tnear], [dx, dy, dz, tfar]] = columns::<8, L>(rays);
         let origin = [x, y, z];
-        let Ready { inverse, reach, margin, closest, ordinary, flies, .. } =
+        let Ready { inverse, margin, closest, ordinary, flies, .. } =
             Ready::new(&origin, &[dx, dy, dz], tnear, tfar, bounds);
         let ([mut near, mut far], mut octants) = ([[[0.0; 8]; 3]; 2], [0; 8]);
         for axis in 0..3 {
@@ -43,7 +42,6 @@ impl Starts {
             near,
             far,
             octants,
-            reach: reach.store(),
             tfar: closest.store(),
             flies: flies & present,
             odd: !ordinary & present,
@@ -62,9 +60,9 @@ impl Starts {
         }
     }
 
-    /// How far the scene reaches from its origin, and what a hit must not lie beyond.
+    /// What a hit of the ray must not lie beyond.
     #[inline(always)]
-    pub fn reach_and_tfar(&self, lane: usize) -> [f32; 2] {
-        [self.reach[lane], self.tfar[lane]]
+    pub fn tfar(&self, lane: usize) -> f32 {
+        self.tfar[lane]
     }
 }

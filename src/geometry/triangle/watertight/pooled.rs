@@ -8,15 +8,21 @@
 //! them once; corners are taken from them, and the edge functions have the same bits as that test's. A triangle with edge functions
 //! of both signs is missed. One whose edge functions are of one sign, none of them zero, is hit for certain.
 //!
-//! **Where.** With `u = 2^-24` and `R` the greatest coordinate distance from the origin to the scene's bounds, sheared
-//! coordinates are off by at most `6u R` (see `likely`), so with `S` the sum of the magnitudes of all sheared coordinates of a
-//! triangle, each edge function is off by at most `10u R (S + 8u R)`. `t` is the mean of the corners' depths weighted by
+//! **Where.** With `u = 2^-24`, `S` the sum of the magnitudes of a triangle's sheared coordinates, and `R` no less than the
+//! greatest coordinate distance from the origin to a corner, sheared coordinates are off by at most `6u R` (see `likely`),
+//! so each edge function is off by at most `10u R (S + 8u R)`. As no coordinate is sheared by more than the third one, `S` and
+//! the greatest of the corners' third coordinates make an `R`: that is their depth times `|dz|`. (Something the scene as a whole reaches
+//! farther than is of no account: in a power plant, seen from inside, most of what may be hit lies in the next few metres.)
+//! `t` is the mean of the corners' depths weighted by
 //! edge functions: it is off by `48u R (S + 8u R) span / |sum|` because of them, where `span` is the distance between the nearest
 //! depth and the farthest, and by some `10u R / |dz|` because depths are rounded, and it is. What a test answers is off likewise:
 //! by up to `30u R / (s |dz|)` for a plane that the ray meets at a speed `s` relative to the greatest component of the
 //! normal (see `distance`). That component is at most `|sum| + 4 S span |dz|`, of which `s` is `|sum|`, so this is
 //! `30u R / |dz| + 120u R S span / |sum|`. The bounds here allow for half as much again as both together. Where `sum` is
 //! so small that this means nothing, the depths themselves are bounds: `t` is kept between them.
+//!
+//! All of that is in proportion to the triangle. What products lose where they underflow is not, near an origin that lies on it
+//! all but for the smallest floats: each by itself that is less than `2^-149`, and the bounds allow for [`TINY`] more.
 
 use super::{Shear, edges, one_sign};
 use crate::geometry::triangle::{Lanes3, RENAMED, Test};
@@ -28,6 +34,8 @@ const SLACK: f32 = 1.0 / (1 << 18) as f32;
 const BLUR: f32 = 1.0 / (1 << 16) as f32;
 /// `16u`, for edge functions.
 const DOUBT: f32 = 1.0 / (1 << 20) as f32;
+/// What is more than any sum of products loses that underflow, times 2^29 and more.
+const TINY: f32 = f32::MIN_POSITIVE * 256.0;
 
 /// A ray as pools see it.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +46,8 @@ pub struct Pooled {
     shear: [f32; 3],
     /// What the coordinates are renamed by: `RENAMED` of the greatest axis.
     axes: [u8; 4],
-    /// How far the scene reaches from the origin.
-    reach: f32,
+    /// How fast the ray runs along its greatest axis.
+    speed: f32,
 }
 
 /// What rays may find in triangles: one ray of each lane in one triangle.
@@ -54,12 +62,10 @@ pub struct Prospects<const W: usize, L: Lanes<W>> {
     pub last: L,
 }
 
-/// Where rays look for hits, and what is off by how much.
+/// How fast rays run along their greatest axes, the reciprocals of that, and where they look for hits.
 struct Sight<L> {
-    /// How far the scene reaches from the origins.
-    reach: L,
-    /// What parameters are off by, whatever the triangle.
-    slack: L,
+    speed: L,
+    scale: L,
     tnear: L,
     tfar: L,
 }
@@ -76,14 +82,14 @@ pub struct Sixteens<'a> {
 
 impl Pooled {
     /// That of no ray.
-    pub const NONE: Self = Self { origin: [0.0; 3], shear: [0.0; 3], axes: [0; 4], reach: 0.0 };
+    pub const NONE: Self = Self { origin: [0.0; 3], shear: [0.0; 3], axes: [0; 4], speed: 0.0 };
 
-    /// Prepares a ray from whose origin the scene reaches so far.
+    /// Prepares a ray.
     #[inline(always)]
-    pub fn new(origin: &[f32; 3], direction: &[f32; 3], reach: f32) -> Self {
+    pub fn new(origin: &[f32; 3], direction: &[f32; 3]) -> Self {
         let Shear { origin, shear, major, .. } = Shear::<1, f32>::new(origin, direction, 1);
         let [i, j, k] = RENAMED[major.unwrap_or(2)].map(|axis| axis as u8);
-        Self { origin, shear, axes: [i, j, k, 0], reach }
+        Self { origin, shear, axes: [i, j, k, 0], speed: 1.0 / shear[2].abs() }
     }
 
     /// Which of the coordinates `x`, `y` and `z` take the places of those.
@@ -95,10 +101,10 @@ impl Pooled {
 
     /// The ray with an origin, of which a [`shear`](shears) was kept, and its greatest axis.
     #[inline(always)]
-    pub fn of_shear(origin: &[f32; 3], shear: [f32; 3], axis: usize, reach: f32) -> Self {
+    pub fn of_shear(origin: &[f32; 3], shear: [f32; 3], axis: usize) -> Self {
         let [i, j, k] = RENAMED[axis % 3];
         let origin = [origin[i], origin[j], origin[k]];
-        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], reach }
+        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], speed: 1.0 / shear[2].abs() }
     }
 
     /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
@@ -131,8 +137,8 @@ impl Pooled {
         let size = size.pick(a) + size.pick(b) + size.pick(c);
 
         let sight = Sight {
-            reach: L::splat(self.reach),
-            slack: L::splat(SLACK * self.reach * scale.abs()),
+            speed: L::splat(self.speed),
+            scale: L::splat(scale.abs()),
             tnear: L::splat(tnear),
             tfar: L::splat(tfar),
         };
@@ -156,20 +162,18 @@ pub fn shears<const W: usize, L: Lanes<W>>(
 /// Rays as pools see them that meet triangles together.
 pub struct Listed<const W: usize, L: Lanes<W>> {
     frame: Shear<W, L>,
-    reach: L,
-    slack: L,
+    speed: L,
 }
 
 impl<const W: usize, L: Lanes<W>> Listed<W, L> {
-    /// Rays of which [`shears`] were kept, and from whose origins the scene reaches so far. Where the greatest axis is neither
-    /// x nor, among the others, y, it is z.
+    /// Rays of which [`shears`] were kept. Where the greatest axis is neither x nor, among the others, y, it is z.
     #[inline(always)]
-    pub fn new(origin: &Lanes3<L>, shear: Lanes3<L>, [is_x, is_y]: [L::Mask; 2], reach: f32) -> Self {
+    pub fn new(origin: &Lanes3<L>, shear: Lanes3<L>, [is_x, is_y]: [L::Mask; 2]) -> Self {
         // Nobody asks for directions.
         let mut frame =
             Shear { major: None, major_x: is_x, major_y: is_y, origin: *origin, direction: *origin, shear };
         frame.origin = frame.renamed(origin);
-        Self { frame, reach: L::splat(reach), slack: L::splat(SLACK * reach) * shear[2].abs() }
+        Self { frame, speed: L::splat(1.0) / shear[2].abs() }
     }
 
     /// A vertex translated and sheared, and its depth, as the rays see it.
@@ -187,7 +191,8 @@ impl<const W: usize, L: Lanes<W>> Listed<W, L> {
         if SIGNS {
             return one_sign(&edges);
         }
-        let doubt = L::splat(DOUBT) * scope(self.reach, size_of(corners));
+        let ([nearest, farthest], size) = (depths(corners), size_of(corners));
+        let doubt = L::splat(DOUBT) * scope(far([nearest, farthest], size, self.speed), size);
         let [a, b, c] = edges;
         !(a.min(b).min(c).lt(L::splat(0.0) - doubt) & doubt.lt(a.max(b).max(c)))
     }
@@ -200,7 +205,7 @@ impl<const W: usize, L: Lanes<W>> Listed<W, L> {
         tnear: L,
         tfar: L,
     ) -> Prospects<W, L> {
-        let sight = Sight { reach: self.reach, slack: self.slack, tnear, tfar };
+        let sight = Sight { speed: self.speed, scale: self.frame.shear[2].abs(), tnear, tfar };
         prospects::<W, L, SIGNS>(corners, size_of(corners), &sight)
     }
 }
@@ -211,10 +216,22 @@ fn size_of<const W: usize, L: Lanes<W>>([a, b, c]: &[Lanes3<L>; 3]) -> L {
     (a[0].abs() + a[1].abs()) + (b[0].abs() + b[1].abs()) + (c[0].abs() + c[1].abs())
 }
 
+/// The nearest depth of a triangle's corners, and the farthest.
+#[inline(always)]
+fn depths<const W: usize, L: Lanes<W>>([[.., a], [.., b], [.., c]]: &[Lanes3<L>; 3]) -> [L; 2] {
+    [a.min(*b).min(*c), a.max(*b).max(*c)]
+}
+
+/// How far the corners of a triangle of such depths and such a size are from the origins at most.
+#[inline(always)]
+fn far<const W: usize, L: Lanes<W>>([nearest, farthest]: [L; 2], size: L, speed: L) -> L {
+    farthest.max(L::splat(0.0) - nearest).mul_add(speed, size)
+}
+
 /// What errors of edge functions are in proportion to.
 #[inline(always)]
-fn scope<const W: usize, L: Lanes<W>>(reach: L, size: L) -> L {
-    reach * (size + L::splat(DOUBT) * reach)
+fn scope<const W: usize, L: Lanes<W>>(far: L, size: L) -> L {
+    far.mul_add(L::splat(DOUBT).mul_add(far, size), L::splat(TINY))
 }
 
 /// What rays may find in triangles of such sizes: sheared corners, and their depths.
@@ -226,21 +243,26 @@ fn prospects<const W: usize, L: Lanes<W>, const SIGNS: bool>(
 ) -> Prospects<W, L> {
     let [[.., depth_a], [.., depth_b], [.., depth_c]] = *corners;
     let [a, b, c] = edges(corners);
+    let [nearest, farthest] = depths(corners);
+    let far = far([nearest, farthest], size, sight.speed);
+    let scope = scope(far, size);
 
     // Whether it may hit, and whether it does.
-    let size = scope(sight.reach, size);
     let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
-    let doubt = if SIGNS { L::splat(0.0) } else { L::splat(DOUBT) * size };
+    let doubt = if SIGNS { L::splat(0.0) } else { L::splat(DOUBT) * scope };
     let (below, above) = (least.lt(L::splat(0.0) - doubt), doubt.lt(greatest));
     let sure = doubt.lt(least) | greatest.lt(L::splat(0.0) - doubt);
 
     // Where.
-    let (nearest, farthest) = (depth_a.min(depth_b).min(depth_c), depth_a.max(depth_b).max(depth_c));
     let share = L::splat(1.0) / (a + b + c);
     let t = c.mul_add(depth_c, b.mul_add(depth_b, a * depth_a)) * share;
-    let error = L::splat(BLUR) * size * (farthest - nearest) * share.abs();
-    let first = (t - error).max(nearest) - sight.slack;
-    let last = (t + error).min(farthest) + sight.slack;
+    let share = share.abs();
+    // (Of numbers so small that processors take their time over them, hardly ever one comes about.)
+    let lost = share.mul_add(L::splat(TINY), L::splat(TINY));
+    let error = (L::splat(BLUR) * scope * (farthest - nearest)).mul_add(share, lost);
+    let slack = (L::splat(SLACK) * sight.scale).mul_add(far, L::splat(TINY));
+    let first = (t - error).max(nearest) - slack;
+    let last = (t + error).min(farthest) + slack;
 
     let possible = !(below & above) & first.le(sight.tfar) & sight.tnear.le(last);
     let certain = possible & sure & sight.tnear.le(first) & last.le(sight.tfar);
@@ -273,19 +295,19 @@ mod tests {
     }
 
     /// A ray in some lanes against one triangle after the other: in the last lane of those, and in one where it has another greatest axis.
-    struct AskListed<'a, const SIGNS: bool>(&'a [[f32; 3]; 2], &'a [Corners; 5], f32, [f32; 2]);
+    struct AskListed<'a, const SIGNS: bool>(&'a [[f32; 3]; 2], &'a [Corners; 5], [f32; 2]);
 
     impl<const SIGNS: bool> AskListed<'_, SIGNS> {
         /// As for [`Ask`].
         #[inline(always)]
         fn ask<const W: usize, L: Lanes<W>>(&self) -> (u32, u32, [f32; 16], [f32; 16]) {
-            let Self([origin, direction], triangles, reach, [tnear, tfar]) = *self;
+            let Self([origin, direction], triangles, [tnear, tfar]) = *self;
             // The others' coordinates are renamed otherwise.
             let turned = |v: &[f32; 3], axis: usize| L::load(&from_fn(|lane| v[(axis + lane + 1) % 3]));
             let lanes = |v: &[f32; 3]| [turned(v, 0), turned(v, 1), turned(v, 2)];
             let (origins, directions) = (lanes(origin), lanes(direction));
             let (shear, axes) = shears::<W, L>(&origins, &directions);
-            let listed = Listed::<W, L>::new(&origins, shear, axes, reach);
+            let listed = Listed::<W, L>::new(&origins, shear, axes);
             let (mut all, lane) = ((0, 0, [0.0; 16], [0.0; 16]), W / 3 * 3 - 1);
             for (i, corners) in triangles.iter().enumerate() {
                 let corners = [listed.see(&corners[0]), listed.see(&corners[1]), listed.see(&corners[2])];
@@ -320,10 +342,7 @@ mod tests {
                 rows[axis][number] = vertex[axis];
             }
         }
-        let reach = (0..3)
-            .flat_map(|axis| vertices.iter().map(move |vertex| (vertex[axis] - origin[axis]).abs()))
-            .fold(0.0, f32::max);
-        let pooled = Pooled::new(&origin, &direction, reach);
+        let pooled = Pooled::new(&origin, &direction);
         let numbers: [u16; 16] =
             std::array::from_fn(|i| ((3 * i) | ((3 * i + 1) << 4) | ((3 * i + 2) << 8)) as u16);
         let sixteens =
@@ -337,8 +356,8 @@ mod tests {
             let by_bounds = chosen.run(Ask::<false>(&pooled, &sixteens, ends));
             let ray = [origin, direction];
             for (of_one, of_lists) in [
-                (by_signs, chosen.run(AskListed::<true>(&ray, corners, reach, ends))),
-                (by_bounds, chosen.run(AskListed::<false>(&ray, corners, reach, ends))),
+                (by_signs, chosen.run(AskListed::<true>(&ray, corners, ends))),
+                (by_bounds, chosen.run(AskListed::<false>(&ray, corners, ends))),
             ] {
                 for (possible, certain, first, last) in of_lists {
                     assert_eq!((possible, certain), (of_one.0, of_one.1), "{isa}, {ray:?}, {corners:?}");
@@ -370,6 +389,23 @@ mod tests {
         counts
     }
 
+    /// Five triangles of a size, flattened by a factor, that a ray meets near their middles up to so far away.
+    fn met(
+        number: &mut impl FnMut() -> f32,
+        [origin, direction]: [[f32; 3]; 2],
+        [size, thin, away]: [f32; 3],
+    ) -> [Corners; 5] {
+        from_fn(|_| {
+            let on_ray = number().abs() * away;
+            let center: [f32; 3] = from_fn(|i| origin[i] + direction[i] * on_ray);
+            let [e, f]: [[f32; 3]; 2] = from_fn(|_| from_fn(|_| number() * size));
+            let corner = |by_e: f32, by_f: f32| {
+                from_fn(|i| center[i] + e[i] * by_e + (f[i] * thin + e[i] * 0.1) * by_f)
+            };
+            [corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)]
+        })
+    }
+
     #[test]
     fn hits_are_never_out_of_bounds_and_mostly_certain() {
         let mut number = uniform(-1.0, 1.0);
@@ -379,19 +415,9 @@ mod tests {
             let size = 10f32.powi(round % 7 - 3);
             let away = 10f32.powi(round / 7 % 6 - 2);
             let thin = 10f32.powi(-(round / 42 % 4));
-            let mut point = |scale: f32| [number() * scale, number() * scale, number() * scale];
-            let direction = point(1.0);
-            let origin = point(away);
-            let corners: [Corners; 5] = std::array::from_fn(|_| {
-                let on_ray = number_of(&mut point);
-                let center: [f32; 3] =
-                    std::array::from_fn(|i| origin[i] + direction[i] * on_ray.abs() * away);
-                let (e, f) = (point(size), point(size));
-                let corner = |by_e: f32, by_f: f32| {
-                    std::array::from_fn(|i| center[i] + e[i] * by_e + (f[i] * thin + e[i] * 0.1) * by_f)
-                };
-                [corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)]
-            });
+            let direction = from_fn(|_| number());
+            let origin = from_fn(|_| number() * away);
+            let corners = met(&mut number, [origin, direction], [size, thin, away]);
             let found = check(origin, direction, &corners, [0.0, f32::MAX]);
             counts = [counts[0] + found[0], counts[1] + found[1]];
         }
@@ -399,9 +425,22 @@ mod tests {
         assert!(hits > 10_000 && 3 * certain > 2 * hits, "{certain} of {hits} hits are certain");
     }
 
-    /// A number out of a point.
-    fn number_of(point: &mut impl FnMut(f32) -> [f32; 3]) -> f32 {
-        point(1.0)[0]
+    #[test]
+    fn no_bound_is_in_proportion_to_what_underflows() {
+        let mut number = uniform(-1.0, 1.0);
+        let mut hits = 0;
+        for round in 0..6000 {
+            // Down to the smallest floats, with origins as small or zero, and directions of all ordinary lengths.
+            let size = 10f32.powi(-(round % 43));
+            let away = size * 10f32.powi(round / 43 % 5 - 2);
+            let thin = 10f32.powi(-(round / 215 % 4));
+            let long = 8f32.powi(round / 7 % 21 - 10);
+            let direction: [f32; 3] = from_fn(|_| number() * long);
+            let origin = if round % 3 == 0 { [0.0; 3] } else { from_fn(|_| number() * away) };
+            let corners = met(&mut number, [origin, direction], [size, thin, away / long]);
+            hits += check(origin, direction, &corners, [0.0, f32::MAX])[0];
+        }
+        assert!(hits > 10_000, "{hits} hits");
     }
 
     proptest! {
