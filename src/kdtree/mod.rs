@@ -167,7 +167,7 @@ impl KdTree {
     /// Makes leaves that hold their corners, if they have not been made. Whether there are any now: a tree may be too
     /// large for them.
     pub fn make_pools(&self) -> bool {
-        self.pools.get_or_init(|| Pools::of_tree(self)).is_some()
+        self.pools.get_or_init(|| Pools::new(&self.triangles)).is_some()
     }
 
     /// Leaves that hold their corners, if they have been made.

@@ -2,11 +2,7 @@
 //!
 //! A ray that walks a kd-tree by itself has to cross each plane in its way to learn that nothing is beyond. A box around what a
 //! subtree holds says that at once. So between the root and the pools lie nodes of eight boxes, each around one of the
-//! subtrees that a node's subtree is cut into; a ray meets all eight together.
-//!
-//! The boxes are those of the *parts* of triangles that lie in a leaf's cell, so they overlap no more than by roundings, where
-//! boxes around whole triangles would. That is what splits bring to a hierarchy of boxes (Stich, Friedrich & Dietrich,
-//! "Spatial splits in bounding volume hierarchies", 2009), and a kd-tree has nothing else; that wide nodes come of opening the
+//! subtrees that a node's subtree is cut into; a ray meets all eight together. That wide nodes come of opening the
 //! largest child until there are eight is of Wald, Benthin & Boulos, "Getting rid of packets", 2008.
 //!
 //! ```text
@@ -24,16 +20,15 @@
 //!                 +---+---------------------------+
 //! ```
 //!
-//! **Which box is nearest** is not a question for the ray's parameters: between two boxes there is a plane of the tree. An *order*
-//! has four bits for each lane, the farthest first, that tell which box comes there for rays that run into an octant.
+//! **Which box is nearest** is not asked of each ray. An *order* has four bits for each lane, the farthest first, that tell which
+//! box comes there for rays that run into an octant: of two parts of the hierarchy the one comes first that lies
+//! first along the axis across which they were cut. Boxes may overlap, so that is a guess, a good one mostly; and rays go
+//! on until nothing that is left begins before what they have found.
 
 use super::MAX_WORD;
 use crate::geometry::Aabb;
-use crate::geometry::clip::Clipper;
-use crate::geometry::triangle::Triangle;
 use crate::huge;
 use crate::kdtree::Node;
-use rayon::prelude::*;
 
 /// Eight boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,45 +94,11 @@ impl Way {
     }
 }
 
-/// Boxes around what the nodes of a tree hold, by node. Leaves name their triangles in `ids`.
-pub fn around(nodes: &[Node], ids: &[u32], triangles: &[Triangle], bounds: &Aabb) -> Vec<Aabb> {
-    let mut leaves = Vec::new();
-    let mut stack = vec![(0, *bounds)];
-    while let Some((index, cell)) = stack.pop() {
-        let node: Node = nodes[index];
-        if node.is_leaf() {
-            leaves.push((index, cell));
-        } else {
-            let below = node.below() as usize;
-            let [low, high] = cell.halves(node.axis(), node.split());
-            stack.extend([(below + 1, high), (below, low)]);
-        }
-    }
-    let clipped = leaves.par_iter().map_init(Clipper::default, |clipper, (index, cell)| {
-        let parts = ids[nodes[*index].references()].iter();
-        let parts = parts.filter_map(|&id| clipper.part(&triangles[id as usize].corners, cell));
-        (*index, parts.fold(Aabb::EMPTY, Aabb::union))
-    });
-    let clipped: Vec<(usize, Aabb)> = clipped.collect();
-    let mut boxes = vec![Aabb::EMPTY; nodes.len()];
-    for (index, part) in clipped {
-        boxes[index] = part;
-    }
-    // Children lie behind their parents.
-    for index in (0..nodes.len()).rev() {
-        if !nodes[index].is_leaf() {
-            let below = nodes[index].below() as usize;
-            boxes[index] = boxes[below].union(boxes[below + 1]);
-        }
-    }
-    boxes
-}
-
-/// Nodes of eight boxes for a tree whose leaves name the first words of their pools; boxes by node. The root is the first;
+/// Nodes of eight boxes for a hierarchy whose leaves name the first words of their pools; boxes by node. The root is the first;
 /// others lie in the order of a depth-first walk that takes larger boxes first.
 pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
     let mut packed: Vec<Boxes> = Vec::new();
-    // Inner nodes of the tree, and from where they are led to.
+    // Inner nodes of the hierarchy, and from where they are led to.
     let mut stack = vec![(0, None)];
     while let Some((index, from)) = stack.pop() {
         let number = packed.len();
@@ -165,9 +126,9 @@ const FULL: usize = 15;
 /// A part of a subtree.
 #[derive(Clone, Copy)]
 enum Part {
-    /// A node of the tree, for one box.
+    /// A node of the hierarchy, for one box.
     Whole(usize),
-    /// Two parts on the two sides of a plane across an axis.
+    /// Two parts, one behind the other along an axis.
     Halves { axis: usize, low: usize, high: usize },
 }
 
@@ -183,21 +144,14 @@ impl Cut {
             let largest = inner.max_by(|(_, a), (_, b)| boxes[*a].area().total_cmp(&boxes[*b].area()));
             let Some((place, index)) = largest else { break };
             let below = nodes[index].below() as usize;
-            parts[place] = match [below, below + 1].map(|child| boxes[child].is_empty()) {
-                // (Where both are empty, so was the whole.)
-                [true, _] => Part::Whole(below + 1),
-                [_, true] => Part::Whole(below),
-                [false, false] => {
-                    let low = parts.len();
-                    parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
-                    Part::Halves { axis: nodes[index].axis(), low, high: low + 1 }
-                }
-            };
+            let low = parts.len();
+            parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
+            parts[place] = Part::Halves { axis: nodes[index].axis(), low, high: low + 1 };
         }
         Self(parts)
     }
 
-    /// The node, in which ways to other nodes are not filled in; and the inner nodes of the tree that those lead to, with
+    /// The node, in which ways to other nodes are not filled in; and the inner nodes of the hierarchy that those lead to, with
     /// their lanes.
     fn node(&self, nodes: &[Node], boxes: &[Aabb]) -> (Boxes, Vec<(usize, usize)>) {
         let mut node = Boxes {
@@ -214,7 +168,6 @@ impl Cut {
                 (node.faces[axis][0][lane], node.faces[axis][1][lane]) = (min[axis], max[axis]);
             }
             match nodes[index].is_leaf() {
-                true if boxes[index].is_empty() => {}
                 true => node.ways[lane] = Way::to_pool(nodes[index].references().start).0,
                 false => inner.push((index, lane)),
             }

