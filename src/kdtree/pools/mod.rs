@@ -6,7 +6,7 @@
 //! sixteen triangles at once, out of three or four lines of the cache that lie in a row.
 //!
 //! What sixteen cost no more than one of changes what a good leaf is, too, and rays that are alone are led to it by few boxes rather
-//! than by many planes: pools are the leaves of a [`hierarchy`] of their own, whose nodes are [`Boxes`].
+//! than by many planes: pools are the leaves of a hierarchy of their own (`hierarchy/`), whose nodes are [`Boxes`].
 //!
 //! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)). One ray against as many
 //! triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets", 2008.

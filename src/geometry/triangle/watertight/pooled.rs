@@ -22,7 +22,7 @@
 //! so small that this means nothing, the depths themselves are bounds: `t` is kept between them.
 //!
 //! All of that is in proportion to the triangle. What products lose where they underflow is not, near an origin that lies on it
-//! all but for the smallest floats: each by itself that is less than `2^-149`, and the bounds allow for [`TINY`] more.
+//! all but for the smallest floats: each by itself that is less than `2^-149`, and the bounds allow for `TINY` more.
 
 use super::{Shear, edges, one_sign};
 use crate::geometry::triangle::{Lanes3, RENAMED, Test};
