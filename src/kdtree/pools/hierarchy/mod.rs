@@ -7,10 +7,10 @@
 //! ([`spatial`]; Stich, Friedrich & Dietrich, "Spatial splits in bounding volume hierarchies", 2009).
 //!
 //! When all is built, parts move to where they do better ([`reinsertion`]). That makes up for what a builder cannot see from above,
-//! a tenth to a fifth of the boxes that rays meet.
+//! up to a fifth of the boxes that rays meet.
 //!
-//! Beside pools that were made of the tree, rays by lists are 1.0 to 1.3 times as fast that way, and pools take half to two thirds
-//! of the memory (`docs/incoherent.md`).
+//! Beside pools that were made of the tree, rays by lists are 0.9 to 1.3 times as fast that way, and pools take 0.4 to 0.8 times
+//! the memory (`docs/incoherent.md`).
 //!
 //! Leaves come of the way back up while it is built. What sixteen triangles cost is no more than one does, so a subtree of few triangles is one leaf
 //! if its chunks, met by every ray that comes to its box, cost less than its boxes and what lies in them. Triangles that
@@ -35,7 +35,7 @@ use reinsertion::{Holds, Loose, Place};
 const CUT: f64 = 0.06;
 
 /// Triangles are parted only where groups of them overlap by more than this, relative to the box around everything (Stich
-/// and others' alpha). With a tenth of it, rays meet up to 1 % fewer boxes and triangles, and building takes up to twice the time.
+/// and others' alpha). With a tenth of it, rays meet up to 2 % fewer boxes and triangles, and building takes up to twice the time.
 const OVERLAP: f64 = 1e-3;
 
 /// How many references there may be beyond one of each triangle, relative to those.

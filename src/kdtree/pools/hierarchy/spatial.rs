@@ -53,12 +53,10 @@ pub fn part(
         };
         // On both sides, all of it on the lower one, or on the upper one.
         let (wider_low, wider_high) = (low.union(bounds), high.union(bounds));
-        let cost = |low: &Aabb, below: usize, high: &Aabb, above: usize| {
-            low.area() * below as f64 + high.area() * above as f64
-        };
-        let parted = cost(&low, below, &high, above);
-        let lower_only = cost(&wider_low, below, &high, above.saturating_sub(1));
-        let upper_only = cost(&low, below.saturating_sub(1), &wider_high, above);
+        let cost = |counts, boxes| Split { axis, at, counts, boxes }.cost();
+        let parted = cost([below, above], [low, high]);
+        let lower_only = cost([below, above.saturating_sub(1)], [wider_low, high]);
+        let upper_only = cost([below.saturating_sub(1), above], [low, wider_high]);
         if lower_only < parted && lower_only <= upper_only {
             (low, above) = (wider_low, above.saturating_sub(1));
             sides[0].push(*reference);
