@@ -2,8 +2,8 @@
 //!
 //! A ray that walks a kd-tree by itself has to cross each plane in its way to learn that nothing is beyond. A box around what a
 //! subtree holds says that at once. So between the root and the pools lie nodes of eight boxes, each around one of the
-//! subtrees that a node's subtree is cut into; a ray meets all eight together. That wide nodes come of opening the
-//! largest child until there are eight is of Wald, Benthin & Boulos, "Getting rid of packets", 2008.
+//! subtrees that a node's subtree is cut into; a ray meets all eight together (Wald, Benthin & Boulos, "Getting rid of packets",
+//! 2008). Which parts those are is planned ahead ([`wide`](super::wide)).
 //!
 //! ```text
 //!                 +---------------------------+---------------------------+----- ... -----+
@@ -26,6 +26,7 @@
 //! on until nothing that is left begins before what they have found.
 
 use super::MAX_WORD;
+use super::wide::Shares;
 use crate::geometry::Aabb;
 use crate::huge;
 use crate::kdtree::Node;
@@ -94,9 +95,9 @@ impl Way {
     }
 }
 
-/// Nodes of eight boxes for a hierarchy whose leaves name the first words of their pools; boxes by node. The root is the first;
-/// others lie in the order of a depth-first walk that takes larger boxes first.
-pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
+/// Nodes of eight boxes for a hierarchy whose leaves name the first words of their pools; boxes by node, and how they are shared out.
+/// The root is the first; others lie in the order of a depth-first walk that takes larger boxes first.
+pub fn pack(nodes: &[Node], boxes: &[Aabb], shares: &[Shares]) -> Vec<Boxes> {
     let mut packed: Vec<Boxes> = Vec::new();
     // Inner nodes of the hierarchy, and from where they are led to.
     let mut stack = vec![(0, None)];
@@ -106,7 +107,7 @@ pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
             let parent: &mut Boxes = &mut packed[parent];
             parent.ways[lane] = number as i32;
         }
-        let cut = Cut::below(index, nodes, boxes);
+        let cut = Cut::below(index, nodes, shares);
         let (node, mut inner) = cut.node(nodes, boxes);
         packed.push(node);
         inner.sort_by(|&(a, _), &(b, _)| boxes[a].area().total_cmp(&boxes[b].area()));
@@ -120,9 +121,6 @@ pub fn pack(nodes: &[Node], boxes: &[Aabb]) -> Vec<Boxes> {
 /// What a subtree is cut into: all of it first, and parts behind those that they are halves of.
 struct Cut(Vec<Part>);
 
-/// Eight parts, and seven that are cut.
-const FULL: usize = 15;
-
 /// A part of a subtree.
 #[derive(Clone, Copy)]
 enum Part {
@@ -133,20 +131,22 @@ enum Part {
 }
 
 impl Cut {
-    /// The largest box is cut in two, until there are eight, or none that can be.
-    fn below(index: usize, nodes: &[Node], boxes: &[Aabb]) -> Self {
+    /// Boxes are shared out as is planned.
+    fn below(index: usize, nodes: &[Node], shares: &[Shares]) -> Self {
         let mut parts = vec![Part::Whole(index)];
-        while parts.len() < FULL {
-            let inner = parts.iter().enumerate().filter_map(|(place, part)| match part {
-                Part::Whole(index) if !nodes[*index].is_leaf() => Some((place, *index)),
-                _ => None,
-            });
-            let largest = inner.max_by(|(_, a), (_, b)| boxes[*a].area().total_cmp(&boxes[*b].area()));
-            let Some((place, index)) = largest else { break };
-            let below = nodes[index].below() as usize;
-            let low = parts.len();
+        // Parts that are cut, and how many boxes their halves get.
+        let mut stack = Vec::new();
+        if !nodes[index].is_leaf() {
+            stack.push((0, index, shares[index].of_node()));
+        }
+        while let Some((place, index, halves)) = stack.pop() {
+            let (low, below) = (parts.len(), nodes[index].below() as usize);
             parts.extend([Part::Whole(below), Part::Whole(below + 1)]);
             parts[place] = Part::Halves { axis: nodes[index].axis(), low, high: low + 1 };
+            for (half, boxes) in halves.into_iter().enumerate() {
+                let shared_out = shares[below + half].of_boxes(boxes);
+                stack.extend(shared_out.map(|halves| (low + half, below + half, halves)));
+            }
         }
         Self(parts)
     }

@@ -14,6 +14,7 @@
 mod boxes;
 mod chunk;
 mod hierarchy;
+mod wide;
 
 pub use boxes::{Boxes, Way};
 pub use chunk::{Chunk, MOST};
@@ -38,12 +39,14 @@ pub struct Pools {
 impl Pools {
     /// Makes those of some triangles, one at least; `None` if there are more of them than ways can lead to.
     pub(super) fn new(triangles: &[Triangle]) -> Option<Self> {
-        let Hierarchy { mut nodes, boxes, ids } = Hierarchy::new(triangles);
+        let mut hierarchy = Hierarchy::new(triangles);
+        let shares = wide::plan(&mut hierarchy, triangles);
+        let Hierarchy { mut nodes, boxes, ids } = hierarchy;
         let words = fill(&mut nodes, &ids, triangles);
         if words.len() > MAX_WORD {
             return None;
         }
-        Some(Self { nodes: boxes::pack(&nodes, &boxes), words })
+        Some(Self { nodes: boxes::pack(&nodes, &boxes, &shares), words })
     }
 
     /// Nodes of boxes; the root is the first.

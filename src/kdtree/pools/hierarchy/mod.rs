@@ -12,9 +12,9 @@
 //! Beside pools that were made of the tree, rays by lists are 0.9 to 1.3 times as fast that way, and pools take 0.4 to 0.8 times
 //! the memory (`docs/incoherent.md`).
 //!
-//! Leaves come of the way back up while it is built. What sixteen triangles cost is no more than one does, so a subtree of few triangles is one leaf
-//! if its chunks, met by every ray that comes to its box, cost less than its boxes and what lies in them. Triangles that
-//! several of its leaves named are named once then.
+//! Leaves are small here: on the way back up a subtree of up to four triangles is one leaf if its chunk, met by every ray that
+//! comes to its box, costs less than its boxes and what lies in them. Triangles that several of its leaves named are named once then. What
+//! sixteen triangles cost is no more than four do, so larger leaves are made in the end, where boxes are short ([`wide`](super::wide)).
 
 mod few;
 mod objects;
@@ -30,8 +30,8 @@ use few::Few;
 use reference::{Reference, around};
 use reinsertion::{Holds, Loose, Place};
 
-/// What cutting a box in two costs a ray, where a chunk costs 1: a third of what a node of eight boxes does, which stands for
-/// three levels. (Half or twice as much makes no difference that can be measured.)
+/// What cutting a box in two costs a ray, where a chunk costs 1: some of what a node of eight boxes does, which stands for two or three
+/// levels. (Half or twice as much makes no difference that can be measured.)
 const CUT: f64 = 0.06;
 
 /// Triangles are parted only where groups of them overlap by more than this, relative to the box around everything (Stich
