@@ -164,10 +164,10 @@ impl KdTree {
         self.lines.all()
     }
 
-    /// Makes leaves that hold their corners, if they have not been made. Whether there are any now: a tree may be too
-    /// large for them.
-    pub fn make_pools(&self) -> bool {
-        self.pools.get_or_init(|| Pools::new(&self.triangles)).is_some()
+    /// Makes leaves that hold their corners, if they have not been made, with up to so many triangles (8, or [`MOST`]: what kernels meet
+    /// at once). Whether there are any now: a tree may be too large for them.
+    pub fn make_pools(&self, most: usize) -> bool {
+        self.pools.get_or_init(|| Pools::new(&self.triangles, most)).is_some()
     }
 
     /// Leaves that hold their corners, if they have been made.

@@ -42,7 +42,7 @@ macro_rules! avx2_lanes {
      $to_float:ident $to_int:ident) => {
         /// Floats in one register.
         #[derive(Clone, Copy, Debug)]
-        pub struct $lanes($float);
+        pub struct $lanes(pub(super) $float);
 
         /// All bits of a lane set, or none.
         #[derive(Clone, Copy, Debug)]

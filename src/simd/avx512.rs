@@ -231,6 +231,14 @@ macro_rules! fold_fours {
 }
 
 impl Sixteen for F32x16 {
+    type Half = avx2::F32x8;
+    const HALVES_PAY: bool = false;
+
+    #[inline(always)]
+    fn pick_half(self, ids: __m256i) -> avx2::F32x8 {
+        let ids = avx512!(_mm512_castsi256_si512(ids));
+        avx2::F32x8(avx512!(_mm512_castps512_ps256(_mm512_permutexvar_ps(ids, self.0))))
+    }
     #[inline(always)]
     fn ids_load(ids: &[i32; 16]) -> __m512i {
         avx512!(_mm512_loadu_si512(ids.as_ptr().cast()))

@@ -148,6 +148,13 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
 }
 
 impl<L: Eight> Sixteen for Pair<L> {
+    type Half = L;
+
+    #[inline(always)]
+    fn pick_half(self, ids: L::Ids) -> L {
+        let is_low = L::ids_less(L::ids_and(ids, L::ids(15)), L::ids(8));
+        L::select(is_low, self.0.pick(ids), self.1.pick(ids))
+    }
     #[inline(always)]
     fn ids_load(ids: &[i32; 16]) -> Self::Ids {
         let [low, high] = ids.as_chunks::<8>().0 else { unreachable!("sixteen are two eights") };
@@ -164,11 +171,7 @@ impl<L: Eight> Sixteen for Pair<L> {
     }
     #[inline(always)]
     fn pick(self, ids: Self::Ids) -> Self {
-        let half = |ids: L::Ids| {
-            let is_low = L::ids_less(L::ids_and(ids, L::ids(15)), L::ids(8));
-            L::select(is_low, self.0.pick(ids), self.1.pick(ids))
-        };
-        Self(half(ids.0), half(ids.1))
+        Self(self.pick_half(ids.0), self.pick_half(ids.1))
     }
     #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {

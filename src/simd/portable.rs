@@ -139,6 +139,8 @@ portable_lanes!(8, F32x8, Mask8, f32x8, i32x8);
 portable_lanes!(16, F32x16, Mask16, f32x16, i32x16);
 
 impl Sixteen for F32x16 {
+    type Half = F32x8;
+
     #[inline(always)]
     fn ids_load(ids: &[i32; 16]) -> wide::i32x16 {
         wide::i32x16::new(*ids)

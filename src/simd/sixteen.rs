@@ -1,9 +1,27 @@
 //! What sixteen lanes can do beside the rest: take up records that lie anywhere, coordinate by coordinate.
 
+use super::eight::Eight;
 use super::lanes::Lanes;
 
 /// Sixteen lanes that can be filled four numbers at a time.
 pub trait Sixteen: Lanes<16> {
+    /// Eight of them.
+    type Half: Eight;
+
+    /// Whether half of the lanes take half the time, as one register does not hold all of them.
+    const HALVES_PAY: bool = true;
+
+    /// Of eight lanes number `i` is lane `ids[i] & 15`.
+    #[inline(always)]
+    fn pick_half(self, ids: <Self::Half as Lanes<8>>::Ids) -> Self::Half {
+        let (values, ids) = (self.store(), Self::Half::ids_store(ids));
+        let mut picked = [0.0; 8];
+        for lane in 0..8 {
+            picked[lane] = values[(ids[lane] & 15) as usize];
+        }
+        Self::Half::load(&picked)
+    }
+
     /// Rows and columns exchanged: lane `j` of vector `i` is number `i` of `fours[j]`.
     #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {

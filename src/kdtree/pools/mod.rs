@@ -37,10 +37,11 @@ pub struct Pools {
 }
 
 impl Pools {
-    /// Makes those of some triangles, one at least; `None` if there are more of them than ways can lead to.
-    pub(super) fn new(triangles: &[Triangle]) -> Option<Self> {
+    /// Makes those of some triangles, one at least, mostly with up to `most` in a leaf; `None` if there are more of them than ways
+    /// can lead to.
+    pub(super) fn new(triangles: &[Triangle], most: usize) -> Option<Self> {
         let mut hierarchy = Hierarchy::new(triangles);
-        let shares = wide::plan(&mut hierarchy, triangles);
+        let shares = wide::plan(&mut hierarchy, triangles, most);
         let Hierarchy { mut nodes, boxes, ids } = hierarchy;
         let words = fill(&mut nodes, &ids, triangles);
         if words.len() > MAX_WORD {

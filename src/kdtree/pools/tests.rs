@@ -54,7 +54,7 @@ fn pools_at(pools: &Pools, point: Vec3, slack: f32) -> (Vec<Held>, usize) {
 fn tree_of(mesh: &Mesh) -> KdTree {
     let tree = KdTree::build(mesh, &BuildParams::default(), None).expect("builds");
     assert!(tree.pools().is_none(), "nobody has asked for them");
-    assert!(tree.make_pools());
+    assert!(tree.make_pools(MOST));
     tree
 }
 

@@ -49,9 +49,10 @@ impl Shares {
     }
 }
 
-/// Makes leaves of the parts that had better be, and says how the boxes of all others are shared out, node by node.
-pub fn plan(hierarchy: &mut Hierarchy, triangles: &[Triangle]) -> Vec<Shares> {
-    let Plan { shares, is_leaf, .. } = Plan::new(hierarchy, triangles);
+/// Makes leaves of up to `most` triangles of the parts that had better be, and says how the boxes of all others are shared out, node
+/// by node.
+pub fn plan(hierarchy: &mut Hierarchy, triangles: &[Triangle], most: usize) -> Vec<Shares> {
+    let Plan { shares, is_leaf, .. } = Plan::new(hierarchy, triangles, most);
     let Hierarchy { nodes, ids, .. } = hierarchy;
     // Parts, and up to how many boxes may stand for each.
     let mut stack = vec![(0, 1)];
@@ -81,11 +82,11 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(hierarchy: &Hierarchy, triangles: &[Triangle]) -> Self {
+    fn new(hierarchy: &Hierarchy, triangles: &[Triangle], most: usize) -> Self {
         let Hierarchy { nodes, boxes, .. } = hierarchy;
         let all = boxes[0].area();
         let share_of_rays = |index: usize| if all > 0.0 { (boxes[index].area() / all) as f32 } else { 1.0 };
-        let chunks = chunks(hierarchy, triangles);
+        let chunks = chunks(hierarchy, triangles, most);
         let mut plan = Self {
             shares: vec![Shares::NONE; nodes.len()],
             is_leaf: vec![true; nodes.len()],
@@ -131,8 +132,8 @@ fn cheapest([low, high]: &[[f32; WIDTH]; 2], boxes: usize) -> (f32, u8) {
     (least, of_low)
 }
 
-/// How many chunks the triangles of each node take as a leaf. Infinitely many if there are too many for one.
-fn chunks(Hierarchy { nodes, ids, .. }: &Hierarchy, triangles: &[Triangle]) -> Vec<f32> {
+/// How many chunks the triangles of each node take as a leaf. Infinitely many if there are more than `most`, and it is none yet.
+fn chunks(Hierarchy { nodes, ids, .. }: &Hierarchy, triangles: &[Triangle], most: usize) -> Vec<f32> {
     let chunks = |(index, node): (usize, &Node)| {
         let named = &ids[named(nodes, index)];
         if node.is_leaf() {
@@ -143,7 +144,7 @@ fn chunks(Hierarchy { nodes, ids, .. }: &Hierarchy, triangles: &[Triangle]) -> V
         let Some(few) = room.get_mut(..named.len()) else { return f32::INFINITY };
         few.copy_from_slice(named);
         let count = sort_and_dedup(few);
-        if count <= MOST { chunk::count(&few[..count], triangles) as f32 } else { f32::INFINITY }
+        if count <= most { chunk::count(&few[..count], triangles) as f32 } else { f32::INFINITY }
     };
     nodes.par_iter().enumerate().map(chunks).collect()
 }
@@ -176,11 +177,12 @@ fn sort_and_dedup(ids: &mut [u32]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Mesh;
     use crate::mesh::generate::shapes;
 
-    fn soup(count: usize, seed: u64) -> Vec<Triangle> {
-        let mesh = shapes::soup(count, seed);
-        (0..count as u32).map(|id| Triangle::new(mesh.corners(id).map(|corner| corner.to_array()))).collect()
+    fn triangles_of(mesh: &Mesh) -> Vec<Triangle> {
+        let corners = |id| mesh.corners(id).map(|corner| corner.to_array());
+        (0..mesh.triangles.len() as u32).map(|id| Triangle::new(corners(id))).collect()
     }
 
     /// All that a part may cost for which up to so many boxes stand: every way to share them out is tried.
@@ -230,13 +232,13 @@ mod tests {
     #[test]
     fn nothing_is_cheaper_than_the_plan() {
         for seed in 0..20 {
-            let triangles = soup(10, seed);
+            let (triangles, most) = (triangles_of(&shapes::soup(10, seed)), [MOST, 8, 3][seed as usize % 3]);
             let mut hierarchy = Hierarchy::new(&triangles);
-            let chunks = chunks(&hierarchy, &triangles);
-            let promised = Plan::new(&hierarchy, &triangles).costs[0][0];
+            let chunks = chunks(&hierarchy, &triangles, most);
+            let promised = Plan::new(&hierarchy, &triangles, most).costs[0][0];
             let all = all_costs(&hierarchy, &chunks, 0, 1, WIDTH);
             let least = all.iter().copied().fold(f32::INFINITY, f32::min);
-            let shares = plan(&mut hierarchy, &triangles);
+            let shares = plan(&mut hierarchy, &triangles, most);
             let kept = cost_of(&hierarchy, &chunks, &shares, 0, 1);
             for cost in [promised, kept] {
                 assert!((cost - least).abs() <= 1e-5 * least, "{cost} in place of {least} of {}", all.len());
@@ -246,29 +248,30 @@ mod tests {
 
     #[test]
     fn leaves_name_what_those_below_them_named_once() {
-        let triangles = soup(3000, 1);
-        let mut hierarchy = Hierarchy::new(&triangles);
-        let (nodes, ids) = (hierarchy.nodes.clone(), hierarchy.ids.clone());
-        plan(&mut hierarchy, &triangles);
-        let mut made = 0;
-        for (index, node) in hierarchy.nodes.iter().enumerate().filter(|(_, node)| node.is_leaf()) {
-            let mut before = ids[named(&nodes, index)].to_vec();
-            before.sort_unstable();
-            before.dedup();
-            assert!(before.len() <= MOST || nodes[index].is_leaf());
-            made += usize::from(!nodes[index].is_leaf());
-            let reached = &hierarchy.ids[node.references()];
-            // (Those below a leaf that was made are reached no more.)
-            assert!(reached == before || nodes[index].is_leaf());
+        let triangles = triangles_of(&shapes::sphere(4));
+        for most in [8, MOST] {
+            let mut hierarchy = Hierarchy::new(&triangles);
+            let (nodes, ids) = (hierarchy.nodes.clone(), hierarchy.ids.clone());
+            plan(&mut hierarchy, &triangles, most);
+            // Leaves that were made; those below them are reached no more.
+            let made = |(index, node): &(usize, &Node)| node.is_leaf() && !nodes[*index].is_leaf();
+            let (mut count, mut largest) = (0, 0);
+            for (index, node) in hierarchy.nodes.iter().enumerate().filter(made) {
+                let mut before = ids[named(&nodes, index)].to_vec();
+                before.sort_unstable();
+                before.dedup();
+                assert_eq!(hierarchy.ids[node.references()], before);
+                (count, largest) = (count + 1, before.len().max(largest));
+            }
+            assert!(count > 50 && most - 3 < largest && largest <= most, "{count}, of up to {largest}");
         }
-        assert!(made > 100, "{made} leaves of several");
     }
 
     #[test]
     fn a_triangle_without_extent_is_a_leaf() {
         let triangles = vec![Triangle::new([[1.0; 3]; 3])];
         let mut hierarchy = Hierarchy::new(&triangles);
-        let shares = plan(&mut hierarchy, &triangles);
+        let shares = plan(&mut hierarchy, &triangles, MOST);
         assert!(hierarchy.nodes[0].is_leaf() && shares[0].of_boxes(WIDTH).is_none());
     }
 }

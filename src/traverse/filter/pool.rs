@@ -14,7 +14,7 @@ use crate::geometry::triangle::pooled::{Listed, Prospects};
 use crate::kdtree::Chunk;
 use crate::simd::{Dense, Mask, Sixteen};
 use crate::traverse::closest::NONE;
-use crate::traverse::pool::ways::prospects;
+use crate::traverse::pool::ways::{Finder, look};
 
 /// Vertices of a chunk as rays see them: two coordinates, and the depth.
 #[repr(C, align(64))]
@@ -67,25 +67,51 @@ pub fn meet_one<L: Sixteen, M: Mode, const ANY: bool>(
 ) {
     let (id, tmin, _) = entries.one(at);
     let (pooled, [tnear, before]) = lot.pooled(id);
-    let mut closest = before;
     // (What is done ends before anything.)
-    if closest < if ANY { tnear } else { tmin } {
+    if before < if ANY { tnear } else { tmin } {
         return;
     }
+    let mut one = One::<ANY> { id, closest: before, is_done: false, candidates };
     for chunk in chunks {
-        let Prospects { possible, certain, first, last } = prospects::<L, M>(&pooled, chunk, tnear, closest);
-        if ANY && certain.any() {
+        look::<L, M>(&pooled, chunk, tnear, &mut one);
+        if ANY && one.is_done {
             lot.end(id);
             return;
         }
-        if !ANY {
-            closest = L::select(certain, last, L::splat(closest)).least();
-        }
-        candidates.add(possible.bits(), L::ids(id), L::ids_load(chunk.ids()), first);
     }
     // What was found beyond does not count any more.
-    if !ANY && closest < before {
-        lot.keep_one(id, closest, NONE);
+    if !ANY && one.closest < before {
+        lot.keep_one(id, one.closest, NONE);
+    }
+}
+
+/// A ray of a list by itself.
+struct One<'a, const ANY: bool> {
+    id: i32,
+    /// What a hit must not lie beyond.
+    closest: f32,
+    /// Whether it hits something for certain, and that is enough.
+    is_done: bool,
+    candidates: &'a mut Candidates,
+}
+
+impl<const ANY: bool> Finder for One<'_, ANY> {
+    #[inline(always)]
+    fn tfar(&self) -> f32 {
+        self.closest
+    }
+
+    #[inline(always)]
+    fn take<const W: usize, L: Dense<W>>(&mut self, found: Prospects<W, L>, ids: &[i32; W]) {
+        let Prospects { possible, certain, first, last } = found;
+        if ANY {
+            self.is_done |= certain.any();
+        } else {
+            self.closest = L::select(certain, last, L::splat(self.closest)).least();
+        }
+        if !self.is_done {
+            self.candidates.add::<W, L>(possible.bits(), L::ids(self.id), L::ids_of(ids), first);
+        }
     }
 }
 

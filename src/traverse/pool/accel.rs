@@ -4,8 +4,8 @@ use super::{OfFlights, alone, trace};
 use crate::error::{Error, Result};
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Accuracy, Hit, Ray};
-use crate::kdtree::Pools;
-use crate::simd::Simd;
+use crate::kdtree::{MOST, Pools};
+use crate::simd::{Isa, Simd};
 use crate::traverse::Accel;
 use crate::traverse::accel::Storage;
 use crate::traverse::query::ResidentQuery;
@@ -26,7 +26,7 @@ impl Accel {
         }
         match &self.storage {
             Storage::Cached(_) => Err(Error::option("--pools", "all of the scene has to be in memory")),
-            Storage::Resident(tree) if tree.make_pools() => Ok(()),
+            Storage::Resident(tree) if tree.make_pools(met_at_once(self.isa())) => Ok(()),
             Storage::Resident(_) => Err(Error::option("--pools", "the tree has too many leaves")),
         }
     }
@@ -70,6 +70,14 @@ impl Accel {
         let mut occluded = [false];
         self.ask_closed(Alone { pools, ray, answers: Any(&mut occluded) });
         occluded[0]
+    }
+}
+
+/// Triangles that a ray meets at once: what a register holds, eight at least.
+fn met_at_once(isa: Isa) -> usize {
+    match isa {
+        Isa::Avx512 => MOST,
+        Isa::Avx2 | Isa::Portable => 8,
     }
 }
 

@@ -6,12 +6,12 @@
 //! asked of those ([`answers`](super::answers)).
 
 use super::step::Slabs;
-use super::ways::prospects;
+use super::ways::{Finder, look};
 use crate::geometry::Ray;
 use crate::geometry::triangle::pooled::{Pooled, Prospects};
 use crate::geometry::triangle::{Candidate, Mode, Test};
 use crate::kdtree::{Chunk, MOST};
-use crate::simd::{Mask, Sixteen};
+use crate::simd::{Dense, Mask, Sixteen};
 
 /// What is known of a ray on its way, its stack left aside.
 #[derive(Clone, Copy)]
@@ -41,6 +41,37 @@ pub struct Finds {
     pub certain: bool,
     /// How many words behind the chunk's first its pool's next one begins, or 0.
     pub next: usize,
+}
+
+/// A ray that looks at a chunk.
+struct Looking<'a> {
+    flight: &'a mut Flight,
+    any: bool,
+    possible: bool,
+    certain: bool,
+}
+
+impl Finder for Looking<'_> {
+    #[inline(always)]
+    fn tfar(&self) -> f32 {
+        self.flight.tfar
+    }
+
+    #[inline(always)]
+    fn take<const W: usize, L: Dense<W>>(&mut self, found: Prospects<W, L>, ids: &[i32; W]) {
+        let Prospects { possible, certain, first, last } = found;
+        let Flight { tfar, count, ids: listed, first: firsts, .. } = &mut *self.flight;
+        if !self.any {
+            *tfar = L::select(certain, last, L::splat(*tfar)).least();
+        }
+        let (possible, certain) = (possible.bits(), certain.bits());
+        let (at, room) = ((*count as usize).min(2 * MOST - W), "room for a register behind a full list");
+        first.close_up(possible, firsts[at..].first_chunk_mut().expect(room));
+        L::close_up_ids(L::ids_of(ids), possible, listed[at..].first_chunk_mut().expect(room));
+        *count = at as u32 + possible.count_ones();
+        self.possible |= possible != 0;
+        self.certain |= certain != 0;
+    }
 }
 
 impl Flight {
@@ -77,21 +108,11 @@ impl Flight {
     #[inline(always)]
     pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize, any: bool) -> Finds {
         let chunk = Chunk::at(words, first);
-        let Prospects { possible, certain, first, last } =
-            prospects::<L, M>(&self.pooled, chunk, self.tnear, self.tfar);
-        if !any {
-            self.tfar = L::select(certain, last, L::splat(self.tfar)).least();
-        }
-        let (possible, certain) = (possible.bits(), certain.bits());
-        let at = (self.count as usize).min(MOST);
-        first.compact(possible, self.first[at..].first_chunk_mut().expect("room for a chunk's"));
-        L::ids_compact(
-            L::ids_load(chunk.ids()),
-            possible,
-            self.ids[at..].first_chunk_mut().expect("room for a chunk's"),
-        );
-        self.count = at as u32 + possible.count_ones();
-        Finds { possible: possible != 0, certain: certain != 0, next: chunk.next() }
+        let (pooled, tnear) = (self.pooled, self.tnear);
+        let mut looking = Looking { flight: self, any, possible: false, certain: false };
+        look::<L, M>(&pooled, chunk, tnear, &mut looking);
+        let Looking { possible, certain, .. } = looking;
+        Finds { possible, certain, next: chunk.next() }
     }
 
     /// The listed triangles that do not lie behind the ray's end for certain. One may be there more than once.

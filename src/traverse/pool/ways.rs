@@ -3,7 +3,7 @@
 use crate::geometry::triangle::Mode;
 use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
 use crate::kdtree::{Boxes, Chunk, Pools, Way};
-use crate::simd::{Sixteen, prefetch};
+use crate::simd::{Dense, Sixteen, prefetch};
 use std::hint::select_unpredictable;
 
 /// Where rays go on.
@@ -37,22 +37,46 @@ impl<'a> Ways<'a> {
     }
 }
 
-/// What a ray may find in a chunk between its ends.
+/// Who takes up what a ray may find.
+pub trait Finder {
+    /// What a hit must not lie beyond.
+    fn tfar(&self) -> f32;
+
+    /// Takes up what there may be in as many triangles, whose ids these are.
+    fn take<const W: usize, L: Dense<W>>(&mut self, found: Prospects<W, L>, ids: &[i32; W]);
+}
+
+/// Has a ray look at a chunk from `tnear` on: at sixteen triangles at once, or at eight, and once more where there are
+/// others.
 #[inline(always)]
-pub fn prospects<L: Sixteen, M: Mode>(
+pub fn look<L: Sixteen, M: Mode>(ray: &Pooled, chunk: Chunk<'_>, tnear: f32, finder: &mut impl Finder) {
+    if M::SIGNS {
+        look_by::<L, true>(ray, chunk, tnear, finder);
+    } else {
+        look_by::<L, false>(ray, chunk, tnear, finder);
+    }
+}
+
+#[inline(always)]
+fn look_by<L: Sixteen, const SIGNS: bool>(
     ray: &Pooled,
     chunk: Chunk<'_>,
     tnear: f32,
-    tfar: f32,
-) -> Prospects<16, L> {
+    finder: &mut impl Finder,
+) {
     let triangles = Sixteens {
         rows: ray.renamed().map(|axis| chunk.row(axis)),
         corners: chunk.corners(),
         count: chunk.count(),
     };
-    if M::SIGNS {
-        ray.prospects::<L, true>(&triangles, tnear, tfar)
+    let (vertices, ids) = (ray.see::<L>(&triangles), chunk.ids());
+    if L::HALVES_PAY {
+        for half in 0..chunk.count().div_ceil(8).min(2) {
+            let found = ray.prospects_of_half::<L, SIGNS>(&vertices, &triangles, half, tnear, finder.tfar());
+            finder.take(found, ids[8 * half..].first_chunk().expect("there are two halves"));
+        }
     } else {
-        ray.prospects::<L, false>(&triangles, tnear, tfar)
+        let found = ray.prospects::<L, SIGNS>(&vertices, &triangles, tnear, finder.tfar());
+        finder.take(found, ids);
     }
 }

@@ -26,7 +26,7 @@
 
 use super::{Shear, edges, one_sign};
 use crate::geometry::triangle::{Lanes3, RENAMED, Test};
-use crate::simd::{Lanes, Sixteen};
+use crate::simd::{Eight, Lanes, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
 const SLACK: f32 = 1.0 / (1 << 18) as f32;
@@ -70,6 +70,14 @@ struct Sight<L> {
     tfar: L,
 }
 
+/// Vertices as a ray sees them: two coordinates, the depth, and the sum of the coordinates' magnitudes.
+pub struct Vertices<L> {
+    x: L,
+    y: L,
+    depth: L,
+    size: L,
+}
+
 /// Sixteen triangles, by their vertices.
 pub struct Sixteens<'a> {
     /// The vertices' coordinates, in the order of [`Pooled::renamed`].
@@ -107,26 +115,28 @@ impl Pooled {
         Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], speed: 1.0 / shear[2].abs() }
     }
 
-    /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
-    /// zero; otherwise they are if those are beyond their error bounds.
+    /// Each vertex translated and sheared, as the ray sees it.
     #[inline(always)]
-    pub fn prospects<L: Sixteen, const SIGNS: bool>(
-        &self,
-        triangles: &Sixteens<'_>,
-        tnear: f32,
-        tfar: f32,
-    ) -> Prospects<16, L> {
-        // Each vertex translated and sheared, as the ray sees it.
+    pub fn see<L: Sixteen>(&self, triangles: &Sixteens<'_>) -> Vertices<L> {
         let [i, j, k] = triangles.rows;
         let [ox, oy, oz] = self.origin;
         let [sx, sy, scale] = self.shear;
         let z = L::load(k) - L::splat(oz);
         let x = (L::load(i) - L::splat(ox)) - L::splat(sx) * z;
         let y = (L::load(j) - L::splat(oy)) - L::splat(sy) * z;
-        let depth = L::splat(scale) * z;
-        let size = x.abs() + y.abs();
+        Vertices { x, y, depth: L::splat(scale) * z, size: x.abs() + y.abs() }
+    }
 
-        // The corners.
+    /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
+    /// zero; otherwise they are if those are beyond their error bounds.
+    #[inline(always)]
+    pub fn prospects<L: Sixteen, const SIGNS: bool>(
+        &self,
+        Vertices { x, y, depth, size }: &Vertices<L>,
+        triangles: &Sixteens<'_>,
+        tnear: f32,
+        tfar: f32,
+    ) -> Prospects<16, L> {
         let a = L::ids_widen(triangles.corners);
         let (b, c) = (L::ids_shift::<4>(a), L::ids_shift::<8>(a));
         let corners = [
@@ -135,15 +145,50 @@ impl Pooled {
             [x.pick(c), y.pick(c), depth.pick(c)],
         ];
         let size = size.pick(a) + size.pick(b) + size.pick(c);
+        self.between::<16, L, SIGNS>(&corners, size, triangles.count, tnear, tfar)
+    }
 
+    /// The same of the first eight triangles, or of the last eight.
+    #[inline(always)]
+    pub fn prospects_of_half<L: Sixteen, const SIGNS: bool>(
+        &self,
+        Vertices { x, y, depth, size }: &Vertices<L>,
+        triangles: &Sixteens<'_>,
+        half: usize,
+        tnear: f32,
+        tfar: f32,
+    ) -> Prospects<8, L::Half> {
+        let first = half * 8;
+        let corners = triangles.corners[first..].first_chunk().expect("there are two halves");
+        let a = L::Half::ids_widen(corners);
+        let (b, c) = (L::Half::ids_shift::<4>(a), L::Half::ids_shift::<8>(a));
+        let corners = [
+            [x.pick_half(a), y.pick_half(a), depth.pick_half(a)],
+            [x.pick_half(b), y.pick_half(b), depth.pick_half(b)],
+            [x.pick_half(c), y.pick_half(c), depth.pick_half(c)],
+        ];
+        let size = size.pick_half(a) + size.pick_half(b) + size.pick_half(c);
+        self.between::<8, L::Half, SIGNS>(&corners, size, triangles.count.saturating_sub(first), tnear, tfar)
+    }
+
+    /// What the ray may find in so many triangles of such corners and sizes.
+    #[inline(always)]
+    fn between<const W: usize, L: Lanes<W>, const SIGNS: bool>(
+        &self,
+        corners: &[Lanes3<L>; 3],
+        size: L,
+        count: usize,
+        tnear: f32,
+        tfar: f32,
+    ) -> Prospects<W, L> {
         let sight = Sight {
             speed: L::splat(self.speed),
-            scale: L::splat(scale.abs()),
+            scale: L::splat(self.shear[2].abs()),
             tnear: L::splat(tnear),
             tfar: L::splat(tfar),
         };
-        let found = prospects::<16, L, SIGNS>(&corners, size, &sight);
-        let present = L::mask_from_bits((1 << triangles.count.min(16)) - 1);
+        let found = prospects::<W, L, SIGNS>(corners, size, &sight);
+        let present = L::mask_from_bits((1 << count.min(W)) - 1);
         Prospects { possible: present & found.possible, certain: present & found.certain, ..found }
     }
 }
@@ -281,6 +326,9 @@ mod tests {
 
     struct Ask<'a, const SIGNS: bool>(&'a Pooled, &'a Sixteens<'a>, [f32; 2]);
 
+    /// So many triangles are asked together.
+    const ASKED: usize = 13;
+
     impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
         /// Bits of what is possible and of what is certain, and the bounds.
         type Output = (u32, u32, [f32; 16], [f32; 16]);
@@ -288,9 +336,26 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self) -> Self::Output {
             let Self(ray, triangles, [tnear, tfar]) = self;
+            let vertices = ray.see::<S::F16>(triangles);
             let Prospects { possible, certain, first, last } =
-                ray.prospects::<S::F16, SIGNS>(triangles, tnear, tfar);
-            (possible.bits(), certain.bits(), first.store(), last.store())
+                ray.prospects::<S::F16, SIGNS>(&vertices, triangles, tnear, tfar);
+            let all = (possible.bits(), certain.bits(), first.store(), last.store());
+            for half in 0..2 {
+                let Prospects { possible, certain, first, last } =
+                    ray.prospects_of_half::<S::F16, SIGNS>(&vertices, triangles, half, tnear, tfar);
+                let of_all = |bits: u32| bits >> (8 * half) & 0xff;
+                assert_eq!((possible.bits(), certain.bits()), (of_all(all.0), of_all(all.1)));
+                for lane in (0..8).filter(|lane| possible.bits() >> lane & 1 == 1) {
+                    let (first, last) = (first.store()[lane], last.store()[lane]);
+                    assert_eq!([first, last], [all.2[8 * half + lane], all.3[8 * half + lane]]);
+                }
+            }
+            let ([possible, certain], [first, last]) = ([all.0, all.1], [all.2, all.3]);
+            for bits in [possible, certain] {
+                (5..16)
+                    .for_each(|i| assert_eq!(bits >> i & 1, if i < ASKED { bits >> (i % 5) & 1 } else { 0 }));
+            }
+            (possible & 31, certain & 31, first, last)
         }
     }
 
@@ -343,10 +408,13 @@ mod tests {
             }
         }
         let pooled = Pooled::new(&origin, &direction);
-        let numbers: [u16; 16] =
-            std::array::from_fn(|i| ((3 * i) | ((3 * i + 1) << 4) | ((3 * i + 2) << 8)) as u16);
+        // Again and again, so that there are some in both halves.
+        let numbers: [u16; 16] = from_fn(|i| {
+            let first = 3 * (i as u16 % 5);
+            first | (first + 1) << 4 | (first + 2) << 8
+        });
         let sixteens =
-            Sixteens { rows: pooled.renamed().map(|axis| &rows[axis]), corners: &numbers, count: 5 };
+            Sixteens { rows: pooled.renamed().map(|axis| &rows[axis]), corners: &numbers, count: ASKED };
         let test = Shear::<1, f32>::new(&origin, &direction, 1);
         let exact = Filter::<1, f32>::new(&origin, &direction, 1);
         let mut counts = [0; 2];
@@ -384,7 +452,6 @@ mod tests {
                     counts[1] += usize::from(certain);
                 }
             }
-            assert_eq!((by_signs.0 | by_bounds.0) >> 5, 0, "what is not there is impossible");
         }
         counts
     }
