@@ -9,6 +9,7 @@ use super::flight::{Finds, Flight};
 use super::step::{Slabs, step};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
+use crate::geometry::triangle::pooled::Pooled;
 use crate::kdtree::{Pools, Tree, Way};
 use crate::simd::Simd;
 use crate::traverse::ready::Ready;
@@ -33,7 +34,7 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     } else {
         let slabs = Slabs::new(&origin, &ready.inverse, &ready.margin);
         let mut flight = Flight::NONE;
-        flight.begin(slabs, ready.closest, ray, 0);
+        flight.begin(slabs, Pooled::new(&origin, &direction), ready.closest, ray, 0);
         with_stacks(
             #[inline(always)]
             |[waiting, ..]| {

@@ -188,6 +188,9 @@ pub trait OfFlights: Told + OneByOne {
         pairs: &mut Pairs,
     ) {
         self.missed(flight.ray as usize);
+        if flight.is_empty() {
+            return;
+        }
         pairs.put_all::<S::F16>(flight, tree.tree.triangles());
         self.answer_if_many::<S, M>(tree, rays, pairs);
     }

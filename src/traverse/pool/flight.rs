@@ -90,11 +90,16 @@ impl Flight {
 
     /// Becomes a ray that has found nothing.
     #[inline(always)]
-    pub fn begin(&mut self, slabs: Slabs, tfar: f32, ray: &Ray, number: usize) {
-        self.slabs = slabs;
-        self.pooled = Pooled::new(&ray.origin.to_array(), &ray.direction.to_array());
+    pub fn begin(&mut self, slabs: Slabs, pooled: Pooled, tfar: f32, ray: &Ray, number: usize) {
+        (self.slabs, self.pooled) = (slabs, pooled);
         (self.top, self.ray, self.count) = (1, number as u32, 0);
         (self.tnear, self.tfar) = (ray.tnear, tfar);
+    }
+
+    /// Whether no triangle is listed.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
     }
 
     /// Whether the list has no room for another chunk's triangles.

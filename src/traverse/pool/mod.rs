@@ -88,7 +88,8 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
                     answers.missed(number);
                 } else {
                     let k = free.pop().expect("as many as rays");
-                    flights[k].begin(starts.slabs(lane), starts.tfar(lane), ray, number);
+                    let pooled = starts.pooled(lane, &ray.origin.to_array());
+                    flights[k].begin(starts.slabs(lane), pooled, starts.tfar(lane), ray, number);
                     stacks[k].begin();
                     at_node.put_if(k, true);
                 }

@@ -1,10 +1,12 @@
 //! Rays made ready, eight together.
 
 use super::step::{Slabs, thick};
+use crate::geometry::triangle::pooled::{Pooled, shears, speed};
 use crate::geometry::{Aabb, Ray};
 use crate::simd::{Eight, Mask};
 use crate::traverse::columns::columns;
 use crate::traverse::ready::Ready;
+use std::array;
 
 /// Eight rays about to start, number by number.
 pub struct Starts {
@@ -13,6 +15,10 @@ pub struct Starts {
     far: [[f32; 8]; 3],
     octants: [u32; 8],
     tfar: [f32; 8],
+    /// Shears, speeds and numbers of the greatest axes, for pools.
+    shears: [[f32; 8]; 3],
+    speeds: [f32; 8],
+    axes: [u8; 8],
     /// Rays that meet the bounds.
     pub flies: u32,
     /// Rays whose numbers lie near the ends of the floats' range, or that are none.
@@ -37,7 +43,17 @@ impl Starts {
                 *octant |= (down >> lane & 1) << axis;
             }
         }
+        let (shear, [is_x, is_y]) = shears(&origin, &[dx, dy, dz]);
+        let (is_x, is_y) = (is_x.bits(), is_y.bits());
+        let axes = array::from_fn(|lane| match [is_x, is_y].map(|bits| bits >> lane & 1) {
+            [0, 0] => 2,
+            [0, _] => 1,
+            _ => 0,
+        });
         Self {
+            shears: [shear[0].store(), shear[1].store(), shear[2].store()],
+            speeds: speed(shear[2]).store(),
+            axes,
             inverse: [inverse[0].store(), inverse[1].store(), inverse[2].store()],
             near,
             far,
@@ -58,6 +74,13 @@ impl Starts {
             far: three(&self.far),
             octant: self.octants[lane],
         }
+    }
+
+    /// The ray in a lane, which starts there, as pools see it.
+    #[inline(always)]
+    pub fn pooled(&self, lane: usize, origin: &[f32; 3]) -> Pooled {
+        let [x, y, z] = &self.shears;
+        Pooled::of_speed(origin, [x[lane], y[lane], z[lane]], self.speeds[lane], usize::from(self.axes[lane]))
     }
 
     /// What a hit of the ray must not lie beyond.

@@ -97,7 +97,7 @@ impl Pooled {
     pub fn new(origin: &[f32; 3], direction: &[f32; 3]) -> Self {
         let Shear { origin, shear, major, .. } = Shear::<1, f32>::new(origin, direction, 1);
         let [i, j, k] = RENAMED[major.unwrap_or(2)].map(|axis| axis as u8);
-        Self { origin, shear, axes: [i, j, k, 0], speed: 1.0 / shear[2].abs() }
+        Self { origin, shear, axes: [i, j, k, 0], speed: speed(shear[2]) }
     }
 
     /// Which of the coordinates `x`, `y` and `z` take the places of those.
@@ -110,9 +110,15 @@ impl Pooled {
     /// The ray with an origin, of which a [`shear`](shears) was kept, and its greatest axis.
     #[inline(always)]
     pub fn of_shear(origin: &[f32; 3], shear: [f32; 3], axis: usize) -> Self {
+        Self::of_speed(origin, shear, speed(shear[2]), axis)
+    }
+
+    /// The same if its [`speed`] along that axis was kept as well.
+    #[inline(always)]
+    pub fn of_speed(origin: &[f32; 3], shear: [f32; 3], speed: f32, axis: usize) -> Self {
         let [i, j, k] = RENAMED[axis % 3];
         let origin = [origin[i], origin[j], origin[k]];
-        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], speed: 1.0 / shear[2].abs() }
+        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], speed }
     }
 
     /// Each vertex translated and sheared, as the ray sees it.
@@ -204,6 +210,12 @@ pub fn shears<const W: usize, L: Lanes<W>>(
     (shear, [major_x, major_y])
 }
 
+/// How fast rays run along their greatest axes, of which their shears hold the reciprocals.
+#[inline(always)]
+pub fn speed<const W: usize, L: Lanes<W>>(reciprocal: L) -> L {
+    L::splat(1.0) / reciprocal.abs()
+}
+
 /// Rays as pools see them that meet triangles together.
 pub struct Listed<const W: usize, L: Lanes<W>> {
     frame: Shear<W, L>,
@@ -218,7 +230,7 @@ impl<const W: usize, L: Lanes<W>> Listed<W, L> {
         let mut frame =
             Shear { major: None, major_x: is_x, major_y: is_y, origin: *origin, direction: *origin, shear };
         frame.origin = frame.renamed(origin);
-        Self { frame, speed: L::splat(1.0) / shear[2].abs() }
+        Self { frame, speed: speed(shear[2]) }
     }
 
     /// A vertex translated and sheared, and its depth, as the rays see it.
