@@ -36,7 +36,7 @@ impl AccuracyOption {
 #[derive(Clone, Debug, clap::Args)]
 pub struct PoolsOption {
     /// Keep leaves that hold their triangles' corners beside the tree, and boxes that lead to them: rays that have nothing in common
-    /// are 1.0 to 2.6 times as fast, and the tree takes about half as much memory again. Answers are the same
+    /// are 1.0 to 2.6 times as fast, and the tree takes a third to a half as much memory again. Answers are the same
     #[arg(long)]
     pools: bool,
 }
