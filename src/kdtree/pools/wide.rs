@@ -107,6 +107,7 @@ impl Plan {
                 of_more[boxes - 2] = of_node;
             }
             let as_node = NODE * share_of_rays(index) + costs[WIDTH - 1];
+            // (Too many triangles in a box that no ray meets cost a NaN, which is no leaf's.)
             plan.is_leaf[index] = as_leaf <= as_node;
             costs[0] = as_leaf.min(as_node);
             for boxes in 2..=WIDTH {
