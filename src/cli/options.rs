@@ -61,12 +61,15 @@ impl PoolsOption {
         Err(Error::option("--pools", message))
     }
 
-    /// Makes them if they are asked for.
+    /// Makes them if they are asked for, unless a scene file has brought them along.
     ///
     /// # Errors
     /// As [`Accel::make_pools`].
     pub fn make(&self, accel: &Accel) -> Result<()> {
         if !self.pools {
+            return Ok(());
+        }
+        if accel.pool_bytes() != 0 {
             return Ok(());
         }
         let start = Instant::now();

@@ -264,7 +264,8 @@ impl Scene {
         }
     }
 
-    fn pool_bytes(&self) -> Option<usize> {
+    /// Bytes of pools, if there are any.
+    pub fn pool_bytes(&self) -> Option<usize> {
         Some(self.accel.pool_bytes()).filter(|&bytes| bytes > 0)
     }
 
@@ -288,8 +289,7 @@ impl Scene {
         }
         describe_tree(lines, &self.tree);
         if let Some(pools) = self.pool_bytes() {
-            let each = pools as f64 / self.tree.triangles as f64;
-            lines.add("pools", format!("{}, {each:.1} bytes per triangle", bytes(pools as u64)));
+            describe_pools(lines, pools, self.tree.triangles);
         }
     }
 }
@@ -314,6 +314,12 @@ impl BuildMemory {
 /// A line about a mesh's size.
 pub fn describe_size(lines: &mut Lines, triangles: u64, vertices: u64) {
     lines.add("triangles", format!("{} with {} vertices", grouped(triangles), grouped(vertices)));
+}
+
+/// A line about pools of so many bytes.
+pub fn describe_pools(lines: &mut Lines, pools: usize, triangles: usize) {
+    let each = pools as f64 / triangles as f64;
+    lines.add("pools", format!("{}, {each:.1} bytes per triangle", bytes(pools as u64)));
 }
 
 /// A line about a tree.

@@ -3,7 +3,7 @@
 use super::lines::{AFTER, Line, Lines, MAX_LINE, MAX_RECORD};
 use super::node::{MAX_INDEX, Node};
 use super::pages::Pages;
-use super::{BuildParams, KdTree, Scale, TreeStats};
+use super::{BuildParams, KdTree, Pools, Scale, TreeStats};
 use crate::column::Column;
 use crate::geometry::Aabb;
 use crate::geometry::triangle::Triangle;
@@ -26,6 +26,8 @@ pub struct Arrays<'a> {
     pub lines: &'a [Line],
     /// Corners and planes by primitive id.
     pub triangles: &'a [Triangle],
+    /// Leaves that hold their corners, if they have been made.
+    pub pools: Option<&'a Pools>,
 }
 
 /// All that a tree consists of: its arrays, as in [`Arrays`], and what is known about it.
@@ -45,6 +47,8 @@ pub struct Parts {
     pub lines: Column<Line>,
     /// See [`Arrays::triangles`].
     pub triangles: Column<Triangle>,
+    /// See [`Arrays::pools`].
+    pub pools: Option<Pools>,
     /// The box around all triangles, in the tree's coordinates.
     pub bounds: Aabb,
     /// What the mesh's coordinates were multiplied by.
@@ -68,6 +72,7 @@ impl KdTree {
             pages: &self.pages.primitives,
             lines: self.lines.all(),
             triangles: &self.triangles,
+            pools: self.pools(),
         }
     }
 
@@ -93,7 +98,7 @@ impl KdTree {
             params: parts.params,
             build_peak: parts.build_peak,
             stats: OnceLock::from(parts.stats),
-            pools: OnceLock::new(),
+            pools: parts.pools.map_or_else(OnceLock::new, |pools| OnceLock::from(Some(pools))),
         })
     }
 }
@@ -196,12 +201,18 @@ mod tests {
             pages: arrays.pages.to_vec().into(),
             lines: arrays.lines.to_vec().into(),
             triangles: arrays.triangles.to_vec().into(),
+            pools: arrays.pools.map(copied),
             bounds: *tree.bounds(),
             scale: tree.scale(),
             params: tree.params().clone(),
             build_peak: tree.build_peak(),
             stats: tree.stats(),
         }
+    }
+
+    fn copied(pools: &Pools) -> Pools {
+        let (nodes, words) = (pools.nodes().to_vec(), pools.words().to_vec());
+        Pools::of_parts(nodes.into(), words.into(), pools.most()).expect("they are whole")
     }
 
     fn tree(triangles: usize) -> KdTree {
@@ -216,6 +227,22 @@ mod tests {
             again.validate().expect("is whole");
             assert_eq!((again.stats(), again.build_peak()), (tree.stats(), tree.build_peak()));
             assert_eq!(again.arrays().lines, tree.arrays().lines);
+            assert!(again.pools().is_none());
+        }
+    }
+
+    #[test]
+    fn so_are_pools() {
+        for (triangles, most) in [(1, 16), (700, 8), (700, 16)] {
+            let tree = tree(triangles);
+            assert!(tree.make_pools(most));
+            let again = KdTree::of_parts(taken_apart(&tree)).expect("is whole");
+            let [pools, theirs] = [&again, &tree].map(|tree| tree.pools().expect("they were made"));
+            assert_eq!((pools.nodes(), pools.words()), (theirs.nodes(), theirs.words()));
+            assert_eq!(pools.most(), most);
+            // They are not made anew.
+            assert!(again.make_pools(24 - most) && again.pools().is_some_and(|pools| pools.most() == most));
+            again.validate().expect("is whole");
         }
     }
 

@@ -29,7 +29,7 @@ impl KdTree {
                 return Err(format!("triangle {primitive} is missing from a leaf that it overlaps"));
             }
         }
-        Ok(())
+        self.pools().map_or(Ok(()), |pools| pools.validate(&self.triangles))
     }
 
     fn validate_shape(&self) -> Result<(), String> {

@@ -5,7 +5,7 @@ use super::section::{ENTRY, Entry};
 use bytemuck::{Pod, Zeroable};
 
 /// The format's version. A reader takes its own and no other.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// What every scene file begins with. A transfer that takes it for text does not leave it as it is: the first
 /// byte is above 127, and both kinds of line end and the old end-of-file mark follow.

@@ -1,11 +1,11 @@
 //! A file's arrays as tree and mesh.
 
-use super::meta::ColorMeta;
+use super::meta::{ColorMeta, PoolsMeta};
 use super::reader::File;
 use super::section::Kind;
 use crate::column::Column;
 use crate::error::{Error, Result};
-use crate::kdtree::{KdTree, Node, Parts};
+use crate::kdtree::{KdTree, Node, Parts, Pools};
 use crate::mesh::{Colors, Mesh};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ const TREE: [Kind; 7] =
 const MESH: [Kind; 4] = [Kind::Positions, Kind::Indices, Kind::TriangleColors, Kind::VertexColors];
 
 impl File {
-    /// The tree, mapped: nothing is copied. Checks the checksums of its sections first, unless that was done.
+    /// The tree, mapped: nothing is copied. So are its pools, if the file has any. Checks the checksums of its sections first, unless that was done.
     ///
     /// # Errors
     /// A section is damaged, or lacks something.
@@ -33,6 +33,7 @@ impl File {
             pages: self.column(Kind::Pages),
             lines: self.column(Kind::Lines),
             triangles: self.column(Kind::Triangles),
+            pools: self.pools()?,
             bounds: meta.tree_bounds(),
             scale: meta.scale(),
             params: meta.params.clone(),
@@ -40,6 +41,14 @@ impl File {
             stats: meta.stats.clone(),
         })
         .map_err(|what| Error::malformed(self.path(), format!("its tree is none: {what}")))
+    }
+
+    /// The tree's pools, likewise, if the file has any.
+    fn pools(&self) -> Result<Option<Pools>> {
+        let Some(PoolsMeta { most, .. }) = self.meta().pools else { return Ok(None) };
+        self.verify_sections(&[Kind::PoolNodes, Kind::PoolWords])?;
+        let pools = Pools::of_parts(self.column(Kind::PoolNodes), self.column(Kind::PoolWords), most);
+        pools.map(Some).map_err(|what| Error::malformed(self.path(), format!("its pools are none: {what}")))
     }
 
     /// The upper tree, the places of its nodes in the full tree, and the full tree's root: what has to be known

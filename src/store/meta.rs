@@ -1,7 +1,7 @@
 //! What is known about a scene, as JSON.
 
 use crate::geometry::Aabb;
-use crate::kdtree::{BuildParams, KdTree, SPREAD_BLOCKS, Scale, Tree, TreeStats};
+use crate::kdtree::{BuildParams, KdTree, Pools, SPREAD_BLOCKS, Scale, Tree, TreeStats};
 use crate::mesh::{Attributes, Colors, MAX_IMAGE_BYTES, Material, Mesh};
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,8 @@ pub struct Meta {
     pub largest_page: usize,
     /// What [`KdTree::spread`] says of the tree.
     pub spread: [usize; SPREAD_BLOCKS.len()],
+    /// What there is of leaves that hold their corners: in the sections `pool-nodes` and `pool-words`.
+    pub pools: Option<PoolsMeta>,
     /// Where colours come from.
     pub colors: ColorMeta,
     /// How many triangles each of the materials has; empty if there are none.
@@ -46,6 +48,26 @@ pub struct Meta {
     pub normals: bool,
     /// The pictures that materials name, in the order of their numbers.
     pub images: Vec<ImageMeta>,
+}
+
+/// Leaves that hold their corners, and the nodes that lead to them: see [`Pools`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoolsMeta {
+    /// Nodes of eight boxes.
+    pub nodes: u64,
+    /// Words of pools.
+    pub words: u64,
+    /// Up to how many triangles leaves mostly have.
+    pub most: usize,
+}
+
+impl PoolsMeta {
+    /// What there is to say of some.
+    fn of(pools: &Pools) -> Self {
+        let [nodes, words] = [pools.nodes().len(), pools.words().len()].map(|count| count as u64);
+        Self { nodes, words, most: pools.most() }
+    }
 }
 
 /// A picture that materials name.
@@ -109,6 +131,7 @@ impl Meta {
             largest_page: pages.map(|page| page.references().len()).max().unwrap_or(0),
             spread: tree.spread(),
             stats,
+            pools: tree.pools().map(PoolsMeta::of),
             colors: ColorMeta::of(&mesh.colors),
             uses: mesh.colors.uses(),
             attributes: !mesh.attributes.is_empty(),

@@ -38,7 +38,7 @@ mod writer;
 
 pub use checksum::{BLOCK, of_block as block_checksum};
 pub use header::VERSION;
-pub use meta::{ColorMeta, ImageMeta, Meta};
+pub use meta::{ColorMeta, ImageMeta, Meta, PoolsMeta};
 pub use reader::File;
 pub use record::SurfaceRecord;
 pub use section::{Kind, Section};

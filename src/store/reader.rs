@@ -165,6 +165,8 @@ impl File {
             (Kind::SurfaceRecords, is(attributes, triangles)),
             (Kind::Emitters, self.meta.emitters()),
             (Kind::Images, self.meta.image_bytes()),
+            (Kind::PoolNodes, self.meta.pools.map_or(0, |pools| pools.nodes)),
+            (Kind::PoolWords, self.meta.pools.map_or(0, |pools| pools.words)),
         ];
         for (kind, expected) in expected {
             let count = self.section(kind).map_or(0, |section| section.count);

@@ -90,6 +90,10 @@ kinds! {
     Emitters = 16, "emitters", 4;
     /// The bytes of pictures' files, one behind the other.
     Images = 17, "images", 1;
+    /// Nodes of eight boxes: see [`Pools::nodes`](crate::kdtree::Pools::nodes).
+    PoolNodes = 18, "pool-nodes", 256;
+    /// The words of pools: see [`Pools::words`](crate::kdtree::Pools::words).
+    PoolWords = 19, "pool-words", 4;
 }
 
 impl fmt::Display for Kind {

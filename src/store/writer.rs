@@ -29,7 +29,8 @@ pub struct Written {
     pub missing_images: Vec<String>,
 }
 
-/// Writes a scene file: a mesh and the tree that was built of it, with the pictures that its materials name.
+/// Writes a scene file: a mesh and the tree that was built of it, its pools if they have been made, with the pictures that its
+/// materials name.
 /// `source` says in words what it was made of.
 /// The file takes its name when it is complete and on the disk; what `path` held before stays until then, and on
 /// failure nothing is left behind. `progress` is told now and then what part (0 to 1) is written.
@@ -59,6 +60,10 @@ pub fn write(
         (Kind::Positions, bytemuck::cast_slice(&mesh.positions)),
         (Kind::Indices, bytemuck::cast_slice(&mesh.triangles)),
     ];
+    if let Some(pools) = arrays.pools {
+        sections.push((Kind::PoolNodes, bytemuck::cast_slice(pools.nodes())));
+        sections.push((Kind::PoolWords, bytemuck::cast_slice(pools.words())));
+    }
     match &mesh.colors {
         Colors::Uniform(_) => {}
         Colors::PerTriangle(colors) => sections.push((Kind::TriangleColors, colors.as_flattened())),

@@ -124,6 +124,38 @@ fn build_says_what_it_did() {
 }
 
 #[test]
+fn pools_are_kept_in_a_scene_file() {
+    let place = models();
+    let built = report(&place, "build faces.ply -o with.rpk --pools");
+    assert!(built["pool_bytes"].as_u64() > Some(0));
+    let sections = built["sections"].as_array().expect("a list");
+    assert!(sections.iter().any(|section| section["kind"] == "pool-nodes"), "{sections:?}");
+    assert!(place.succeed("build faces.ply -o with.rpk --pools").contains("\npools "));
+    assert!(report(&place, "build faces.ply -o without.rpk").get("pool_bytes").is_none());
+    place.write("rays.npy", rays());
+    let trace = |scene: &str, more: &str| {
+        let drawn = report(&place, &format!("render {scene} -o a.png --size 40x40 {more}"));
+        place.succeed(&format!("cast {scene} --rays rays.npy -o hits.npz {more}"));
+        (drawn["scene"]["tree"]["pool_bytes"].clone(), place.read("a.png"), place.read("hits.npz"))
+    };
+    let (none, picture, hits) = trace("without.rpk", "");
+    assert!(none.is_null());
+    for (scene, more) in [("with.rpk", ""), ("with.rpk", "--pools"), ("without.rpk", "--pools")] {
+        let (pools, same_picture, same_hits) = trace(scene, more);
+        assert_eq!(pools, built["pool_bytes"], "{scene} {more}");
+        assert!(same_picture == picture && same_hits == hits, "{scene} {more}");
+    }
+    // Who has no use for them leaves them where they are.
+    let (none, same_picture, same_hits) = trace("with.rpk", "--memory 64MiB");
+    assert!(none.is_null() && same_picture == picture && same_hits == hits);
+    trace("with.rpk", "--accuracy fast");
+    let proved = place.succeed("info with.rpk --verify --validate");
+    assert!(proved.contains("pool-words") && proved.contains("valid "), "{proved}");
+    place
+        .fail("build faces.ply -o a.rpk --pools --memory 1GiB", &["--pools", "--memory does not count them"]);
+}
+
+#[test]
 fn several_models_become_one_scene() {
     let place = models();
     let text = place.succeed("build plain.ply faces.ply materials.obj -o scene.rpk");

@@ -3,13 +3,14 @@
 pub mod large;
 
 use super::model::Model;
-use super::options::BuildOptions;
+use super::options::{BuildOptions, PoolsOption};
 use super::outputs::same_file;
 use super::progress::Bar;
 use super::report::{ENGINE, Engine, Json, Lines, bytes, counted, duration};
-use super::scene::{BuildMemory, Origin, Scene, describe_size, describe_tree};
+use super::scene::{BuildMemory, Origin, Scene, describe_pools, describe_size, describe_tree};
 use crate::error::{Error, Result};
 use crate::files::check_writable;
+use crate::geometry::Accuracy;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::{Mesh, ReadReport};
 use crate::simd::Isa;
@@ -23,6 +24,8 @@ use std::time::Instant;
 /// The file holds the mesh with its colours and the tree: opening it reads and builds nothing. Several models
 /// become one scene. Primitive ids run on from model to model in the order in which they are named.
 ///
+/// With --pools, the file holds pools too, and every command that traces what it opens goes through them.
+///
 /// With --memory, models that are larger than that, with their tree, are read and built piece by piece: the same scene, in
 /// more time. What waits for its turn lies in files beside the scene file, and goes with the command.
 #[derive(Clone, Debug, clap::Args)]
@@ -35,6 +38,8 @@ pub struct Args {
     output: PathBuf,
     #[command(flatten)]
     build: BuildOptions,
+    #[command(flatten)]
+    pools: PoolsOption,
     #[command(flatten)]
     json: Json,
 }
@@ -53,6 +58,9 @@ struct Report<'a> {
     parts: Option<usize>,
     build_params: &'a BuildParams,
     tree: &'a TreeStats,
+    /// Bytes of pools, if they were made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pool_bytes: Option<usize>,
     /// Seconds of checksums and of writing, until all is on the disk; `None` if that went along with building.
     write_seconds: Option<f64>,
     file: &'a Path,
@@ -80,6 +88,7 @@ pub fn run(args: &Args) -> Result<()> {
     let profile = args.build.profile()?;
     args.check_output()?;
     args.json.check()?;
+    args.pools.check(&args.build, Accuracy::default())?;
 
     if let Some(limit) = args.build.limit()?
         && large::is_called_for(&args.models, &args.build, &profile.build)?
@@ -95,6 +104,7 @@ pub fn run(args: &Args) -> Result<()> {
             parts: Some(large.parts),
             build_params: &profile.build,
             tree: &large.tree,
+            pool_bytes: None,
             write_seconds: None,
             file: &args.output,
             bytes: large.written.bytes,
@@ -107,6 +117,7 @@ pub fn run(args: &Args) -> Result<()> {
     let (model, models) = read(&args.models)?;
     let source = model.name.clone();
     let scene = model.build(&args.build, &profile.build, isa)?;
+    args.pools.make(&scene.accel)?;
     let start = Instant::now();
     let written = args.write(&scene, &source)?;
     let write_seconds = start.elapsed().as_secs_f64();
@@ -125,6 +136,7 @@ pub fn run(args: &Args) -> Result<()> {
         parts: None,
         build_params: scene.accel.tree().params(),
         tree: &scene.tree,
+        pool_bytes: scene.pool_bytes(),
         write_seconds: Some(write_seconds),
         file: &args.output,
         bytes: written.bytes,
@@ -204,6 +216,9 @@ fn text(report: &Report<'_>) -> String {
         Some(parts) => describe_parts(&mut lines, report.build_seconds, report.build_memory, parts),
     }
     describe_tree(&mut lines, report.tree);
+    if let Some(pools) = report.pool_bytes {
+        describe_pools(&mut lines, pools, report.triangles);
+    }
     let time = report.write_seconds.map(|seconds| format!(", in {}", duration(seconds))).unwrap_or_default();
     for image in report.missing_images {
         lines.add("missing", image);

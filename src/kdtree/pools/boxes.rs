@@ -30,9 +30,11 @@ use super::wide::Shares;
 use crate::geometry::Aabb;
 use crate::huge;
 use crate::kdtree::Node;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// Eight boxes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Boxes {
     /// For each axis the least coordinates, and the greatest. A box that is not there begins at infinity and ends at the
@@ -45,6 +47,12 @@ pub struct Boxes {
 }
 
 impl Boxes {
+    /// One of the boxes; an empty one if it is not there.
+    pub fn bounds(&self, lane: usize) -> Aabb {
+        let [min, max] = [0, 1].map(|side| Vec3::from_array(self.faces.map(|faces| faces[side][lane])));
+        Aabb { min, max }
+    }
+
     /// Which box comes at each place, the farthest first, for rays that run into an octant.
     #[inline(always)]
     pub fn lanes(&self, octant: usize) -> [usize; 8] {

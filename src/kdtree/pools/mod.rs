@@ -8,18 +8,21 @@
 //! What sixteen cost no more than one of changes what a good leaf is, too, and rays that are alone are led to it by few boxes rather
 //! than by many planes: pools are the leaves of a hierarchy of their own (`hierarchy/`), whose nodes are [`Boxes`].
 //!
-//! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)). One ray against as many
+//! They are made beside a tree when someone asks ([`KdTree::make_pools`](super::KdTree::make_pools)), and a scene file holds those of its tree if
+//! it was written with them. One ray against as many
 //! triangles as a register has lanes: Wald, Benthin & Boulos, "Getting rid of packets", 2008.
 
 mod boxes;
 mod chunk;
 mod hierarchy;
+mod validate;
 mod wide;
 
 pub use boxes::{Boxes, Way};
 pub use chunk::{Chunk, MOST};
 
 use super::Node;
+use crate::column::Column;
 use crate::geometry::triangle::Triangle;
 use crate::huge;
 use hierarchy::Hierarchy;
@@ -31,9 +34,11 @@ const MAX_WORD: usize = (1 << 29) - 2;
 /// Leaves that hold their corners, and the nodes that lead to them.
 #[derive(Debug)]
 pub struct Pools {
-    nodes: Vec<Boxes>,
+    nodes: Column<Boxes>,
     /// Chunks, one behind the other; a leaf's in a row.
-    words: Vec<u32>,
+    words: Column<u32>,
+    /// Up to how many triangles leaves mostly have.
+    most: usize,
 }
 
 impl Pools {
@@ -47,7 +52,32 @@ impl Pools {
         if words.len() > MAX_WORD {
             return None;
         }
-        Some(Self { nodes: boxes::pack(&nodes, &boxes, &shares), words })
+        Some(Self { nodes: boxes::pack(&nodes, &boxes, &shares).into(), words: words.into(), most })
+    }
+
+    /// Those of arrays that were theirs before, whose leaves mostly have up to `most` triangles.
+    ///
+    /// Looks at what costs no walk. That the rest is as it was made is for the caller to know, as of
+    /// [`KdTree::of_parts`](super::KdTree::of_parts).
+    ///
+    /// # Errors
+    /// A sentence about what cannot be part of any pools.
+    pub fn of_parts(nodes: Column<Boxes>, words: Column<u32>, most: usize) -> Result<Self, String> {
+        if nodes.is_empty() || nodes.len() > MAX_WORD {
+            return Err(format!("{} is no number of nodes of boxes", nodes.len()));
+        }
+        if words.len() < 2 + chunk::SPAN || words.len() > MAX_WORD + chunk::SPAN {
+            return Err(format!("{} words are no pools", words.len()));
+        }
+        if most == 0 || most > MOST {
+            return Err(format!("leaves of pools have up to {MOST} triangles, not {most}"));
+        }
+        Ok(Self { nodes, words, most })
+    }
+
+    /// Up to how many triangles leaves mostly have: as many as kernels meet at once, where they were made.
+    pub const fn most(&self) -> usize {
+        self.most
     }
 
     /// Nodes of boxes; the root is the first.

@@ -135,7 +135,7 @@ fn a_leaf_of_many_triangles_is_a_row_of_chunks() {
         let chunks = chunk::count(&ids, &triangles);
         assert_eq!(chunks, ids.len().div_ceil(most));
         words.resize(words.len() + chunk::SPAN, 0);
-        let pools = Pools { nodes: Vec::new(), words };
+        let pools = Pools { nodes: Vec::new().into(), words: words.into(), most: MOST };
         let found = leaf(&pools, 3);
         assert_eq!(found.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids);
         for (id, corners) in found {
@@ -150,6 +150,83 @@ fn zeros_of_both_signs_are_two_vertices() {
     let mut vertices = chunk::Vertices::default();
     assert_eq!(vertices.take(&signs[0].corners), Some([0, 1, 2]));
     assert_eq!(vertices.take(&signs[0].corners), Some([0, 1, 2]));
+}
+
+/// Pools of which something is changed.
+fn changed(pools: &Pools, change: impl FnOnce(&mut Vec<Boxes>, &mut Vec<u32>)) -> Pools {
+    let (mut nodes, mut words) = (pools.nodes().to_vec(), pools.words().to_vec());
+    change(&mut nodes, &mut words);
+    Pools::of_parts(nodes.into(), words.into(), pools.most()).expect("of possible sizes")
+}
+
+#[test]
+fn pools_that_were_made_are_whole() {
+    let sliver = Mesh { triangles: vec![[0, 1, 2]; 3], ..shapes::soup(1, 5) };
+    for mesh in [shapes::soup(2000, 1), shapes::soup(9, 2), shapes::soup(1, 3), sliver] {
+        for most in [8, MOST] {
+            let tree = KdTree::build(&mesh, &BuildParams::default(), None).expect("builds");
+            assert!(tree.make_pools(most));
+            tree.pools().expect("they are made").validate(tree.triangles()).expect("whole");
+        }
+    }
+}
+
+#[test]
+fn pools_that_are_not_whole_are_found_out() {
+    let tree = tree_of(&shapes::soup(2000, 1));
+    let pools = tree.pools().expect("they are made");
+    let (nodes, words) = (pools.nodes(), pools.words());
+    let is_pool = |way: &i32| Way(*way).is_pool() && Way(*way) != Way::NOTHING;
+    let lane_of = |node: &Boxes, wanted: bool| node.ways.iter().position(|way| is_pool(way) == wanted);
+    let (with_pool, pool) = (0..nodes.len())
+        .find_map(|node| lane_of(&nodes[node], true).map(|lane| (node, lane)))
+        .expect("there are pools");
+    let inner = lane_of(&nodes[0], false).expect("the root leads to nodes");
+    let word = Way(nodes[with_pool].ways[pool]).word();
+    let found_out = |change: &dyn Fn(&mut Vec<Boxes>, &mut Vec<u32>), expected: &str| {
+        let message = changed(pools, change).validate(tree.triangles()).expect_err(expected);
+        assert!(message.contains(expected), "\"{message}\" is not about {expected}");
+    };
+    found_out(&|nodes, _| nodes[0].ways[inner] = i32::MAX, "there is no node of boxes");
+    found_out(&|nodes, _| nodes[0].ways[inner] = 0, "two boxes lead to node of boxes 0");
+    found_out(&|nodes, _| nodes.push(nodes[0]), &format!("no box leads to node of boxes {}", nodes.len()));
+    found_out(&|nodes, _| nodes[0].orders[3] = 0, "the order for octant 3 of node of boxes 0");
+    found_out(&|nodes, _| nodes[with_pool].ways[pool] = Way::to_pool(MAX_WORD).0, "beyond the last");
+    let below = nodes[0].ways[inner] as usize;
+    found_out(
+        &|nodes, _| nodes[below].faces[1][1][0] = 1e30,
+        &format!("a box of node of boxes {below} is larger"),
+    );
+    found_out(&|nodes, _| nodes[with_pool].faces[0][1][pool] = -1e30, "is empty, and leads to something");
+    // The pool of triangles that another one does not have.
+    found_out(
+        &|nodes, _| {
+            nodes[with_pool].ways[pool] = Way::NOTHING.0;
+            for side in 0..2 {
+                nodes[with_pool].faces[0][side][pool] = [1.0, -1.0][side];
+            }
+        },
+        "no box around a corner of triangle",
+    );
+    let ids =
+        word + Chunk::at(words, word).ids().as_ptr().addr().wrapping_sub(words[word..].as_ptr().addr()) / 4;
+    found_out(&|_, words| words[ids] = 2000, "names triangle 2000");
+    found_out(&|_, words| words[ids] ^= 1, "holds another corner 0 of triangle");
+    found_out(&|_, words| words[word] &= !31, "a chunk of 0 triangles");
+}
+
+#[test]
+fn parts_of_impossible_sizes_are_refused() {
+    let node = Boxes { faces: [[[0.0; 8]; 2]; 3], ways: [Way::NOTHING.0; 8], orders: [0; 8] };
+    let refused = |nodes: usize, words: usize, most: usize, expected: &str| {
+        let message = Pools::of_parts(vec![node; nodes].into(), vec![0; words].into(), most);
+        let message = message.map(drop).expect_err(expected);
+        assert!(message.contains(expected), "\"{message}\" is not about {expected}");
+    };
+    refused(0, 2 + chunk::SPAN, 16, "0 is no number of nodes");
+    refused(1, 1 + chunk::SPAN, 16, "words are no pools");
+    refused(1, 2 + chunk::SPAN, 0, "not 0");
+    refused(1, 2 + chunk::SPAN, 17, "not 17");
 }
 
 #[test]

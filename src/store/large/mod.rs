@@ -146,6 +146,7 @@ pub fn build(
             largest_page,
             spread,
             stats: stats.clone(),
+            pools: None,
             colors: color_meta(&mesh.colors),
             uses: surfaces.uses,
             attributes: mesh.attributes.is_some(),

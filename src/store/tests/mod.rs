@@ -2,6 +2,7 @@
 
 mod damage;
 mod large;
+mod pools;
 mod round_trip;
 mod surfaces;
 
