@@ -66,10 +66,7 @@ impl PoolsOption {
     /// # Errors
     /// As [`Accel::make_pools`].
     pub fn make(&self, accel: &Accel) -> Result<()> {
-        if !self.pools {
-            return Ok(());
-        }
-        if accel.pool_bytes() != 0 {
+        if !self.pools || accel.pool_bytes() != 0 {
             return Ok(());
         }
         let start = Instant::now();

@@ -7,6 +7,7 @@ use super::options::BuildOptions;
 use super::report::{Lines, bytes, duration, grouped};
 use crate::cache::{CacheOptions, Cached};
 use crate::error::Result;
+use crate::geometry::Accuracy;
 use crate::kdtree::{BuildParams, TreeStats};
 use crate::mesh::{Mesh, ReadReport};
 use crate::scene::CachedSurface;
@@ -264,9 +265,9 @@ impl Scene {
         }
     }
 
-    /// Bytes of pools, if there are any.
+    /// Bytes of pools, if there are any that rays go through.
     pub fn pool_bytes(&self) -> Option<usize> {
-        Some(self.accel.pool_bytes()).filter(|&bytes| bytes > 0)
+        Some(self.accel.pool_bytes()).filter(|&bytes| bytes > 0 && self.accel.accuracy() != Accuracy::Fast)
     }
 
     /// The same in words.

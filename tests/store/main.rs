@@ -148,7 +148,7 @@ fn pools_are_kept_in_a_scene_file() {
     // Who has no use for them leaves them where they are.
     let (none, same_picture, same_hits) = trace("with.rpk", "--memory 64MiB");
     assert!(none.is_null() && same_picture == picture && same_hits == hits);
-    trace("with.rpk", "--accuracy fast");
+    assert!(trace("with.rpk", "--accuracy fast").0.is_null());
     let proved = place.succeed("info with.rpk --verify --validate");
     assert!(proved.contains("pool-words") && proved.contains("valid "), "{proved}");
     place
