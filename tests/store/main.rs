@@ -136,7 +136,7 @@ fn pools_are_kept_in_a_scene_file() {
     let trace = |scene: &str, more: &str| {
         let drawn = report(&place, &format!("render {scene} -o a.png --size 40x40 {more}"));
         place.succeed(&format!("cast {scene} --rays rays.npy -o hits.npz {more}"));
-        (drawn["scene"]["tree"]["pool_bytes"].clone(), place.read("a.png"), place.read("hits.npz"))
+        (drawn["tree"]["pool_bytes"].clone(), place.read("a.png"), place.read("hits.npz"))
     };
     let (none, picture, hits) = trace("without.rpk", "");
     assert!(none.is_null());
