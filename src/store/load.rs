@@ -18,7 +18,8 @@ const TREE: [Kind; 7] =
 const MESH: [Kind; 4] = [Kind::Positions, Kind::Indices, Kind::TriangleColors, Kind::VertexColors];
 
 impl File {
-    /// The tree, mapped: nothing is copied. So are its pools, if the file has any. Checks the checksums of its sections first, unless that was done.
+    /// The tree, and its pools if the file has any, mapped: nothing is copied. Checks the checksums of their sections first, unless
+    /// that was done.
     ///
     /// # Errors
     /// A section is damaged, or lacks something.

@@ -11,9 +11,9 @@ use glam::Vec3;
 const ALL_CORNERS: u8 = 0b111;
 
 impl Pools {
-    /// Checks that these are pools of some triangles: each node is led to from one box, and lies in it, as pools do; what chunks hold of a
-    /// triangle are its corners, to the bit; and every triangle is in some, so that each of its corners lies in a box
-    /// that leads to it. (That all points between do is not looked at.)
+    /// Checks that these are pools of some triangles: one box leads to each node, and holds the node's boxes; what chunks hold of a
+    /// triangle are its corners, to the bit; and each corner of every triangle lies in a box around a pool that names it.
+    /// (That all points between do is not looked at.)
     ///
     /// # Errors
     /// A sentence about the first thing that is wrong.
