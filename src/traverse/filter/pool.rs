@@ -73,7 +73,7 @@ pub fn meet_one<L: Sixteen, M: Mode, const ANY: bool>(
     }
     let mut one = One::<ANY> { id, closest: before, is_done: false, candidates };
     for chunk in chunks {
-        look::<L, M>(&pooled, chunk, tnear, &mut one);
+        look::<L, M, false>(&pooled, chunk, tnear, &mut one);
         if ANY && one.is_done {
             lot.end(id);
             return;

@@ -195,8 +195,14 @@ pub trait OfFlights: Told + OneByOne {
         self.answer_if_many::<S, M>(tree, rays, pairs);
     }
 
-    /// Answers a ray that has ended and is alone.
-    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight);
+    /// Answers a ray that has ended and is alone, and of which the test asks that.
+    fn decide<M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        test: &M::Alone,
+        ray: &Ray,
+        flight: &Flight,
+    );
 }
 
 impl Told for Closest<'_> {
@@ -245,8 +251,14 @@ impl Told for Closest<'_> {
 
 impl OfFlights for Closest<'_> {
     #[inline(always)]
-    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
-        let nearest = flight.nearest::<M>(tree.records, ray);
+    fn decide<M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        test: &M::Alone,
+        ray: &Ray,
+        flight: &Flight,
+    ) {
+        let nearest = flight.nearest::<M>(test, tree.records, ray);
         self.0[flight.ray as usize] =
             nearest.map_or(Hit::MISS, |(id, candidate)| hit_of::<M>(tree, id, &candidate));
     }
@@ -295,7 +307,13 @@ impl Told for Any<'_> {
 
 impl OfFlights for Any<'_> {
     #[inline(always)]
-    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: &Ray, flight: &Flight) {
-        self.0[flight.ray as usize] = flight.nearest::<M>(tree.records, ray).is_some();
+    fn decide<M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        test: &M::Alone,
+        ray: &Ray,
+        flight: &Flight,
+    ) {
+        self.0[flight.ray as usize] = flight.nearest::<M>(test, tree.records, ray).is_some();
     }
 }

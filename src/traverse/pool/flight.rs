@@ -9,9 +9,9 @@ use super::step::Slabs;
 use super::ways::{Finder, look};
 use crate::geometry::Ray;
 use crate::geometry::triangle::pooled::{Pooled, Prospects};
-use crate::geometry::triangle::{Candidate, Mode, Test};
+use crate::geometry::triangle::{Candidate, Mode, Test, Triangle};
 use crate::kdtree::{Chunk, MOST};
-use crate::simd::{Dense, Mask, Sixteen};
+use crate::simd::{Dense, Mask, Sixteen, prefetch_both};
 
 /// What is known of a ray on its way, its stack left aside.
 #[derive(Clone, Copy)]
@@ -43,15 +43,15 @@ pub struct Finds {
     pub next: usize,
 }
 
-/// A ray that looks at a chunk.
-struct Looking<'a> {
+/// A ray that looks at a chunk. `EARLY` as for [`Flight::look`].
+struct Looking<'a, const EARLY: bool> {
     flight: &'a mut Flight,
     any: bool,
     possible: bool,
     certain: bool,
 }
 
-impl Finder for Looking<'_> {
+impl<const EARLY: bool> Finder for Looking<'_, EARLY> {
     #[inline(always)]
     fn tfar(&self) -> f32 {
         self.flight.tfar
@@ -60,6 +60,9 @@ impl Finder for Looking<'_> {
     #[inline(always)]
     fn take<const W: usize, L: Dense<W>>(&mut self, found: Prospects<W, L>, ids: &[i32; W]) {
         let Prospects { possible, certain, first, last } = found;
+        if EARLY && !possible.any() {
+            return;
+        }
         let Flight { tfar, count, ids: listed, first: firsts, .. } = &mut *self.flight;
         if !self.any {
             *tfar = L::select(certain, last, L::splat(*tfar)).least();
@@ -110,14 +113,30 @@ impl Flight {
 
     /// Looks at the chunk that begins at a word, and lists what the ray may hit. With `any`, nobody asks any more where the
     /// ray ends once it hits something for certain.
+    ///
+    /// With `EARLY` it stops where there is nothing to be hit, for the price of branches that nobody can foresee. A ray that is
+    /// alone is 1.0 to 1.1 times as quick with it, streams have 0.92 to 0.99 of their rate.
     #[inline(always)]
-    pub fn look<L: Sixteen, M: Mode>(&mut self, words: &[u32], first: usize, any: bool) -> Finds {
+    pub fn look<L: Sixteen, M: Mode, const EARLY: bool>(
+        &mut self,
+        words: &[u32],
+        first: usize,
+        any: bool,
+    ) -> Finds {
         let chunk = Chunk::at(words, first);
         let (pooled, tnear) = (self.pooled, self.tnear);
-        let mut looking = Looking { flight: self, any, possible: false, certain: false };
-        look::<L, M>(&pooled, chunk, tnear, &mut looking);
+        let mut looking = Looking::<EARLY> { flight: self, any, possible: false, certain: false };
+        look::<L, M, EARLY>(&pooled, chunk, tnear, &mut looking);
         let Looking { possible, certain, .. } = looking;
         Finds { possible, certain, next: chunk.next() }
+    }
+
+    /// Fetches the record of the triangle that was listed last, if any was.
+    #[inline(always)]
+    pub fn fetch_last(&self, records: &[Triangle]) {
+        if let Some(&id) = self.ids.get((self.count as usize).wrapping_sub(1)) {
+            prefetch_both(records.as_ptr().wrapping_add(id as usize));
+        }
     }
 
     /// The listed triangles that do not lie behind the ray's end for certain. One may be there more than once.
@@ -152,7 +171,7 @@ impl Flight {
     #[cold]
     #[inline(never)]
     pub fn settle<M: Mode>(&mut self, records: &[M::Record], ray: &Ray) {
-        let nearest = self.nearest::<M>(records, ray);
+        let nearest = self.nearest::<M>(&test_of::<M>(ray), records, ray);
         self.count = 0;
         if let Some((id, Candidate { t, .. })) = nearest {
             (self.ids[0], self.first[0], self.count) = (id as i32, t, 1);
@@ -162,8 +181,12 @@ impl Flight {
 
     /// The nearest of what is listed, by the mode's own test, and the lowest id of several as near.
     #[inline(always)]
-    pub fn nearest<M: Mode>(&self, records: &[M::Record], ray: &Ray) -> Option<(u32, Candidate<1, f32>)> {
-        let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+    pub fn nearest<M: Mode>(
+        &self,
+        test: &M::Alone,
+        records: &[M::Record],
+        ray: &Ray,
+    ) -> Option<(u32, Candidate<1, f32>)> {
         let tfar = f32::MAX.min(ray.tfar);
         let mut best: Option<(u32, Candidate<1, f32>)> = None;
         for id in self.left() {
@@ -177,4 +200,10 @@ impl Flight {
         }
         best
     }
+}
+
+/// What the mode's test of one triangle asks of a ray.
+#[inline(always)]
+pub fn test_of<M: Mode>(ray: &Ray) -> M::Alone {
+    M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1)
 }

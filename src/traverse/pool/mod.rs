@@ -112,7 +112,8 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
                 free.put_if(k, true);
                 continue;
             }
-            let Finds { possible, certain, next } = flight.look::<S::F16, M>(ways.words, way.word(), A::ANY);
+            let Finds { possible, certain, next } =
+                flight.look::<S::F16, M, false>(ways.words, way.word(), A::ANY);
             waiting.exits[top] = way.further(next).0;
             flight.top -= u32::from(next == 0);
             let ends = A::ANY & certain;

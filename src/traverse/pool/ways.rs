@@ -47,18 +47,23 @@ pub trait Finder {
 }
 
 /// Has a ray look at a chunk from `tnear` on: at sixteen triangles at once, or at eight, and once more where there are
-/// others.
+/// others. `EARLY` as for [`prospects`](Pooled::prospects).
 #[inline(always)]
-pub fn look<L: Sixteen, M: Mode>(ray: &Pooled, chunk: Chunk<'_>, tnear: f32, finder: &mut impl Finder) {
+pub fn look<L: Sixteen, M: Mode, const EARLY: bool>(
+    ray: &Pooled,
+    chunk: Chunk<'_>,
+    tnear: f32,
+    finder: &mut impl Finder,
+) {
     if M::SIGNS {
-        look_by::<L, true>(ray, chunk, tnear, finder);
+        look_by::<L, true, EARLY>(ray, chunk, tnear, finder);
     } else {
-        look_by::<L, false>(ray, chunk, tnear, finder);
+        look_by::<L, false, EARLY>(ray, chunk, tnear, finder);
     }
 }
 
 #[inline(always)]
-fn look_by<L: Sixteen, const SIGNS: bool>(
+fn look_by<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
     ray: &Pooled,
     chunk: Chunk<'_>,
     tnear: f32,
@@ -72,11 +77,12 @@ fn look_by<L: Sixteen, const SIGNS: bool>(
     let (vertices, ids) = (ray.see::<L>(&triangles), chunk.ids());
     if L::HALVES_PAY {
         for half in 0..chunk.count().div_ceil(8).min(2) {
-            let found = ray.prospects_of_half::<L, SIGNS>(&vertices, &triangles, half, tnear, finder.tfar());
+            let found =
+                ray.prospects_of_half::<L, SIGNS, EARLY>(&vertices, &triangles, half, tnear, finder.tfar());
             finder.take(found, ids[8 * half..].first_chunk().expect("there are two halves"));
         }
     } else {
-        let found = ray.prospects::<L, SIGNS>(&vertices, &triangles, tnear, finder.tfar());
+        let found = ray.prospects::<L, SIGNS, EARLY>(&vertices, &triangles, tnear, finder.tfar());
         finder.take(found, ids);
     }
 }

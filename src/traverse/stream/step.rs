@@ -26,8 +26,14 @@ pub struct Crossing {
 
 /// The deepest stack of a ray: of the eight exits of each line, or boxes of each node, on a way of
 /// [`crate::kdtree::MAX_DEPTH`] levels all but one wait, and the end of the walk does; and room for eight to be written
-/// at once. (A line is three levels, a node of boxes can be one.)
-const DEPTH: usize = (crate::kdtree::MAX_DEPTH * 7 + 2 + 8).next_multiple_of(16);
+/// at once. (A line is three levels, a node of boxes can be one.) A ray that takes two things off its stack at a time has some
+/// more room to do so.
+const DEPTH: usize = (crate::kdtree::MAX_DEPTH * 7 + 2 + 8 + IN_PAIRS + 16).next_multiple_of(16);
+
+/// The highest top from which a ray may take two things off its stack, and put up to sixteen there, before it goes on with one
+/// at a time: what is on the stack then is no way from the root by which one of each seven is gone on with, but lies
+/// below such a way.
+pub const IN_PAIRS: usize = 16;
 
 /// What waits for a ray: exits, and its intervals in them.
 #[derive(Clone)]

@@ -26,7 +26,7 @@
 
 use super::{Shear, edges, one_sign};
 use crate::geometry::triangle::{Lanes3, RENAMED, Test};
-use crate::simd::{Eight, Lanes, Sixteen};
+use crate::simd::{Eight, Lanes, Mask, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
 const SLACK: f32 = 1.0 / (1 << 18) as f32;
@@ -134,9 +134,10 @@ impl Pooled {
     }
 
     /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
-    /// zero; otherwise they are if those are beyond their error bounds.
+    /// zero; otherwise they are if those are beyond their error bounds. With `EARLY`, nobody asks where where signs say that nothing
+    /// may be hit.
     #[inline(always)]
-    pub fn prospects<L: Sixteen, const SIGNS: bool>(
+    pub fn prospects<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
         &self,
         Vertices { x, y, depth, size }: &Vertices<L>,
         triangles: &Sixteens<'_>,
@@ -151,12 +152,12 @@ impl Pooled {
             [x.pick(c), y.pick(c), depth.pick(c)],
         ];
         let size = size.pick(a) + size.pick(b) + size.pick(c);
-        self.between::<16, L, SIGNS>(&corners, size, triangles.count, tnear, tfar)
+        self.between::<16, L, SIGNS, EARLY>(&corners, size, triangles.count, tnear, tfar)
     }
 
     /// The same of the first eight triangles, or of the last eight.
     #[inline(always)]
-    pub fn prospects_of_half<L: Sixteen, const SIGNS: bool>(
+    pub fn prospects_of_half<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
         &self,
         Vertices { x, y, depth, size }: &Vertices<L>,
         triangles: &Sixteens<'_>,
@@ -174,12 +175,18 @@ impl Pooled {
             [x.pick_half(c), y.pick_half(c), depth.pick_half(c)],
         ];
         let size = size.pick_half(a) + size.pick_half(b) + size.pick_half(c);
-        self.between::<8, L::Half, SIGNS>(&corners, size, triangles.count.saturating_sub(first), tnear, tfar)
+        self.between::<8, L::Half, SIGNS, EARLY>(
+            &corners,
+            size,
+            triangles.count.saturating_sub(first),
+            tnear,
+            tfar,
+        )
     }
 
     /// What the ray may find in so many triangles of such corners and sizes.
     #[inline(always)]
-    fn between<const W: usize, L: Lanes<W>, const SIGNS: bool>(
+    fn between<const W: usize, L: Lanes<W>, const SIGNS: bool, const EARLY: bool>(
         &self,
         corners: &[Lanes3<L>; 3],
         size: L,
@@ -193,8 +200,12 @@ impl Pooled {
             tnear: L::splat(tnear),
             tfar: L::splat(tfar),
         };
-        let found = prospects::<W, L, SIGNS>(corners, size, &sight);
         let present = L::mask_from_bits((1 << count.min(W)) - 1);
+        if EARLY && SIGNS && !(present & one_sign(&edges(corners))).any() {
+            let (none, zero) = (L::mask_from_bits(0), L::splat(0.0));
+            return Prospects { possible: none, certain: none, first: zero, last: zero };
+        }
+        let found = prospects::<W, L, SIGNS>(corners, size, &sight);
         Prospects { possible: present & found.possible, certain: present & found.certain, ..found }
     }
 }

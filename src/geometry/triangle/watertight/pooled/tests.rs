@@ -20,11 +20,16 @@ impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
         let Self(ray, triangles, [tnear, tfar]) = self;
         let vertices = ray.see::<S::F16>(triangles);
         let Prospects { possible, certain, first, last } =
-            ray.prospects::<S::F16, SIGNS>(&vertices, triangles, tnear, tfar);
+            ray.prospects::<S::F16, SIGNS, false>(&vertices, triangles, tnear, tfar);
         let all = (possible.bits(), certain.bits(), first.store(), last.store());
+        let early = ray.prospects::<S::F16, SIGNS, true>(&vertices, triangles, tnear, tfar);
+        assert_eq!((early.possible.bits(), early.certain.bits()), (all.0, all.1));
+        for lane in (0..16).filter(|lane| all.0 >> lane & 1 == 1) {
+            assert_eq!([early.first.store()[lane], early.last.store()[lane]], [all.2[lane], all.3[lane]]);
+        }
         for half in 0..2 {
             let Prospects { possible, certain, first, last } =
-                ray.prospects_of_half::<S::F16, SIGNS>(&vertices, triangles, half, tnear, tfar);
+                ray.prospects_of_half::<S::F16, SIGNS, false>(&vertices, triangles, half, tnear, tfar);
             let of_all = |bits: u32| bits >> (8 * half) & 0xff;
             assert_eq!((possible.bits(), certain.bits()), (of_all(all.0), of_all(all.1)));
             for lane in (0..8).filter(|lane| possible.bits() >> lane & 1 == 1) {
