@@ -136,11 +136,11 @@ pub fn take_one<L: Eight, const ANY: bool>(
     let (id, tmin, _) = entries.one(at);
     let (slabs, closest) = lot.slabs(id);
     let tmin = if ANY { lot.begin(id) } else { tmin };
-    let Met { order, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest);
+    let Met { ways, enters, bits, .. } = meet::<L, false>(node, &slabs, tmin, closest);
     if ANY {
         entries.write_id(at, id);
     } else {
         entries.write_starts_of(at, bits, id, enters);
     }
-    heads.push_each::<L>(L::ids_pick(L::ids_load(&node.ways), order), bits, at);
+    heads.push_each::<L>(ways, bits, at);
 }

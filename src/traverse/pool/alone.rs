@@ -114,8 +114,7 @@ impl<R> Walk<'_, '_, R> {
         if !way.is_pool() {
             let Flight { slabs, tnear, .. } = &*self.flight;
             let node = &self.pools.nodes()[way.node()];
-            let Met { order, enters, bits, .. } = meet::<S::F8>(node, slabs, *tnear, tfar);
-            let ways = S::F8::ids_pick(S::F8::ids_load(&node.ways), order);
+            let Met { ways, enters, bits, .. } = meet::<S::F8, false>(node, slabs, *tnear, tfar);
             S::F8::ids_compact(ways, bits, eight(&mut self.waiting.exits, free));
             if !A::ANY {
                 enters.compact(bits, eight(&mut self.waiting.tmin, free));

@@ -132,7 +132,9 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
             if flight.is_full() {
                 flight.settle::<M>(records, &rays[flight.ray as usize]);
             }
-            flight.top = waiting.reached::<S::F8>(flight.top as usize, flight.tfar) as u32;
+            if !A::ANY {
+                flight.top = waiting.reached::<S::F8>(flight.top as usize, flight.tfar) as u32;
+            }
             let is_pool = ways.fetch(waiting.exits[flight.top as usize]);
             more_chunks.put_if(k, is_pool);
             at_node.put_if(k, !is_pool);
@@ -149,7 +151,12 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
             let top = flight.top as usize;
             let at = (top, Way(waiting.exits[top]));
-            let (top, way) = step::<S::F8>(ways.nodes, &flight.slabs, waiting, at, flight.tnear, flight.tfar);
+            let Flight { slabs, tnear, tfar, .. } = flight;
+            let (top, way) = if A::ANY {
+                step::<S::F8, true>(ways.nodes, slabs, waiting, at, *tnear, *tfar)
+            } else {
+                step::<S::F8, false>(ways.nodes, slabs, waiting, at, *tnear, *tfar)
+            };
             flight.top = top as u32;
             at_chunk.put_if(k, ways.fetch(way.0));
         }

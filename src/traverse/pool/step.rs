@@ -57,9 +57,9 @@ pub fn thick<const W: usize, L: Lanes<W>>(origin: L, inverse: L, margin: L) -> [
 }
 
 /// Takes a node, which was on top of a stack, puts there the boxes that the ray goes into between its ends, and gives the new
-/// top and what is there.
+/// top and what is there. With `ANY`, nobody asks which of them is nearest, nor where the ray enters them.
 #[inline(always)]
-pub fn step<L: Eight>(
+pub fn step<L: Eight, const ANY: bool>(
     nodes: &[Boxes],
     ray: &Slabs,
     waiting: &mut Waiting,
@@ -68,20 +68,24 @@ pub fn step<L: Eight>(
     tfar: f32,
 ) -> (usize, Way) {
     let node = &nodes[way.node()];
-    let Met { order, nibbles, enters, bits } = meet::<L>(node, ray, tnear, tfar);
-    L::ids_compact(L::ids_pick(L::ids_load(&node.ways), order), bits, eight(&mut waiting.exits, top));
-    enters.compact(bits, eight(&mut waiting.tmin, top));
+    let Met { ways, nibbles, enters, bits } = meet::<L, ANY>(node, ray, tnear, tfar);
+    L::ids_compact(ways, bits, eight(&mut waiting.exits, top));
+    if !ANY {
+        enters.compact(bits, eight(&mut waiting.tmin, top));
+    }
     // What is on top now is known before it can be read there.
     let before = waiting.exits[top - 1];
-    let nearest = node.ways[(nibbles >> (4 * (bits | 1).ilog2()) & 7) as usize];
-    let way = select_unpredictable(bits == 0, before, nearest);
+    let last = (bits | 1).ilog2();
+    let next = node.ways[if ANY { last & 7 } else { nibbles >> (4 * last) & 7 } as usize];
+    let way = select_unpredictable(bits == 0, before, next);
     (top + bits.count_ones() as usize - 1, Way(way))
 }
 
-/// The boxes of a node that a ray goes into, the farthest first.
+/// The boxes of a node that a ray goes into, the farthest first, or as the node has them.
 pub struct Met<L: Eight> {
-    /// Which box each lane is, in four bits of a number each, too.
-    pub order: L::Ids,
+    /// The way to what is in each lane's box.
+    pub ways: L::Ids,
+    /// Which box each lane is, in four bits each, unless they are as the node has them.
     nibbles: u32,
     /// Where the ray enters it.
     pub enters: L,
@@ -89,9 +93,9 @@ pub struct Met<L: Eight> {
     pub bits: u32,
 }
 
-/// Has a ray meet a node's boxes between its ends.
+/// Has a ray meet a node's boxes between its ends. With `ANY` they stay in the order that the node has them in.
 #[inline(always)]
-pub fn meet<L: Eight>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32) -> Met<L> {
+pub fn meet<L: Eight, const ANY: bool>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32) -> Met<L> {
     let Boxes { faces: [x, y, z], orders, .. } = node;
     // Where the ray enters each box, and where it leaves it.
     let octant = ray.octant as usize;
@@ -107,11 +111,16 @@ pub fn meet<L: Eight>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32) -> Met<L
     let enters = enters_x.max(enters_y).max(enters_z.max(L::splat(tnear)));
     let leaves = leaves_x.min(leaves_y).min(leaves_z.min(L::splat(tfar)));
 
+    let ways = L::ids_load(&node.ways);
+    if ANY {
+        return Met { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
+    }
     // The farthest first.
     let nibbles = orders[octant & 7];
     let order = L::ids_nibbles(nibbles);
     let (enters, leaves) = (enters.pick(order), leaves.pick(order));
-    Met { order, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
+    let ways = L::ids_pick(ways, order);
+    Met { ways, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
 }
 
 #[cfg(test)]
@@ -141,8 +150,21 @@ mod tests {
             waiting.exits[3] = Way::ROOT.0;
             let nodes = std::slice::from_ref(node);
             let at = (3, Way::ROOT);
-            let (top, way) = step::<S::F8>(nodes, &starts.slabs(0), &mut waiting, at, ray.tnear, ray.tfar);
+            let (top, way) =
+                step::<S::F8, false>(nodes, &starts.slabs(0), &mut waiting, at, ray.tnear, ray.tfar);
             assert_eq!(way.0, waiting.exits[top]);
+            // Who asks for any hit goes the same ways, in whatever order.
+            let mut any = Waiting::new();
+            any.exits[3] = Way::ROOT.0;
+            let (any_top, any_way) =
+                step::<S::F8, true>(nodes, &starts.slabs(0), &mut any, at, ray.tnear, ray.tfar);
+            assert_eq!(any_way.0, any.exits[any_top]);
+            let sorted = |waiting: &Waiting, top: usize| {
+                let mut ways = waiting.exits[3..=top].to_vec();
+                ways.sort_unstable();
+                ways
+            };
+            assert_eq!(sorted(&any, any_top), sorted(&waiting, top));
             (3..=top).map(|place| (waiting.exits[place], waiting.tmin[place])).collect()
         }
     }
