@@ -30,9 +30,9 @@ pub struct Crossing {
 /// more room to do so.
 const DEPTH: usize = (crate::kdtree::MAX_DEPTH * 7 + 2 + 8 + IN_PAIRS + 16).next_multiple_of(16);
 
-/// The highest top from which a ray may take two things off its stack, and put up to sixteen there, before it goes on with one
-/// at a time: what is on the stack then is no way from the root by which one of each seven is gone on with, but lies
-/// below such a way.
+/// The highest place from below which a ray may take two things off its stack at a time. They leave sixteen at most, so that no
+/// more than so many and sixteen are there when it goes on one at a time; and from then on, until it is down here again, no
+/// more than seven wait for each level, on top of those.
 pub const IN_PAIRS: usize = 16;
 
 /// What waits for a ray: exits, and its intervals in them.
