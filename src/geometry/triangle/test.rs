@@ -1,6 +1,7 @@
 //! What every ray-triangle test is to a traversal kernel.
 
 use super::{Accuracy, Placed, Triangle};
+use crate::geometry::Ray;
 use crate::simd::{Eight, Lanes};
 
 /// Three coordinates, `W` lanes each.
@@ -147,6 +148,12 @@ pub trait Mode {
     type Test<const W: usize, L: Lanes<W>>: Test<W, L, Record = Self::Record>;
     /// The test for one ray.
     type Alone: Alone<Record = Self::Record>;
+
+    /// Prepares one ray.
+    #[inline(always)]
+    fn alone(ray: &Ray) -> Self::Alone {
+        Self::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1)
+    }
 
     /// Each lane's ray against a triangle of its own, from `tnear` to `tfar`: the numbers of a [`Triangle`] in
     /// lanes, three corners and the plane.

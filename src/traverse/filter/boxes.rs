@@ -136,7 +136,7 @@ pub fn take_one<L: Eight, const ANY: bool>(
     let (id, tmin, _) = entries.one(at);
     let (slabs, closest) = lot.slabs(id);
     let tmin = if ANY { lot.begin(id) } else { tmin };
-    let Met { ways, enters, bits, .. } = meet::<L, false>(node, &slabs, tmin, closest);
+    let Met { ways, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest, false);
     if ANY {
         entries.write_id(at, id);
     } else {

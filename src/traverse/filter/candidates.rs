@@ -108,7 +108,7 @@ impl Candidates {
                 continue;
             }
             let ray = rays.ray(place + Lot::place(id));
-            let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+            let test = M::alone(&ray);
             let candidate = test.test(&resident.records[primitive as usize], true);
             let t = candidate.t;
             let is_nearer = t < closest || t == closest && (ANY || primitive < other);

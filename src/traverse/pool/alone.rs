@@ -4,22 +4,22 @@
 //! waits for the one before it, from a node's number to the mask that says where to go on. So a ray takes *two* things off its stack at
 //! a time, be they nodes or chunks: neither asks anything of the other, so that a processor has both at work together. Hardly
 //! any of that is for nothing, as nearly all that is put on a stack is visited in the end. What comes of
-//! the farther one is put back first, so that rays go on in the order of one at a time. Beside that, camera, diffuse and random rays and ambient occlusion
-//! in three models are 1.0 to 1.3 times as quick; with three at a time, 0.9 to 1.15 times as quick as with two.
+//! the farther one is put back first, so that rays go on in the order of one at a time. Beside one at a time, camera, diffuse and random rays and ambient
+//! occlusion in three models are 1.0 to 1.3 times as quick; with three at a time, 0.9 to 1.15 times as quick as with two.
 //!
 //! In the end the mode's own test is asked of the one or two triangles that are left on the ray's list, one by one.
 
 use super::answers::OfFlights;
-use super::flight::{Finds, Flight, test_of};
-use super::step::{Met, Slabs, meet};
+use super::flight::{Finds, Flight};
+use super::step::{Slabs, meet};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
 use crate::geometry::triangle::pooled::Pooled;
 use crate::kdtree::{Pools, Tree, Way};
-use crate::simd::{Eight, Simd};
+use crate::simd::Simd;
 use crate::traverse::ready::Ready;
 use crate::traverse::records::Resident;
-use crate::traverse::stream::step::{IN_PAIRS, Waiting, eight};
+use crate::traverse::stream::step::{IN_PAIRS, Waiting};
 use crate::traverse::stream::with_stacks;
 
 /// Traces a ray, and gives an answer for ray 0.
@@ -41,7 +41,7 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
         let mut flight = Flight::NONE;
         flight.begin(slabs, Pooled::new(&origin, &direction), ready.closest, ray, 0);
         // Nothing that is met on the way has any part in this, so it is ready by then.
-        let test = test_of::<M>(ray);
+        let test = M::alone(ray);
         with_stacks(
             #[inline(always)]
             |[waiting, ..]| {
@@ -49,7 +49,7 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
                 if walk.all::<S, M, A>() {
                     answers.hits(0);
                 } else {
-                    answers.decide::<M>(resident, &test, ray, &flight);
+                    answers.decide::<M>(resident, 0, flight.nearest::<M>(&test, resident.records, ray));
                 }
             },
         );
@@ -114,12 +114,8 @@ impl<R> Walk<'_, '_, R> {
         if !way.is_pool() {
             let Flight { slabs, tnear, .. } = &*self.flight;
             let node = &self.pools.nodes()[way.node()];
-            let Met { ways, enters, bits, .. } = meet::<S::F8, false>(node, slabs, *tnear, tfar);
-            S::F8::ids_compact(ways, bits, eight(&mut self.waiting.exits, free));
-            if !A::ANY {
-                enters.compact(bits, eight(&mut self.waiting.tmin, free));
-            }
-            self.top += bits.count_ones() as usize;
+            let met = meet::<S::F8>(node, slabs, *tnear, tfar, false);
+            self.top += met.put(self.waiting, free, A::ANY);
             return false;
         }
         let words = self.pools.words();

@@ -4,7 +4,7 @@
 //! asks the mode's test of a triangle and of the ray that may hit it, and hits are written by whole registers, where they are nearer
 //! than what the same ray had before.
 
-use super::flight::Flight;
+use super::flight::{Flight, Nearest};
 use crate::geometry::triangle::{self, Candidate, Mode, Own, Test, Triangle};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{MOST, Tree};
@@ -195,14 +195,8 @@ pub trait OfFlights: Told + OneByOne {
         self.answer_if_many::<S, M>(tree, rays, pairs);
     }
 
-    /// Answers a ray that has ended and is alone, and of which the test asks that.
-    fn decide<M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        test: &M::Alone,
-        ray: &Ray,
-        flight: &Flight,
-    );
+    /// Answers a ray that hits that, the nearest of what it may hit, or nothing.
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>);
 }
 
 impl Told for Closest<'_> {
@@ -251,16 +245,8 @@ impl Told for Closest<'_> {
 
 impl OfFlights for Closest<'_> {
     #[inline(always)]
-    fn decide<M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        test: &M::Alone,
-        ray: &Ray,
-        flight: &Flight,
-    ) {
-        let nearest = flight.nearest::<M>(test, tree.records, ray);
-        self.0[flight.ray as usize] =
-            nearest.map_or(Hit::MISS, |(id, candidate)| hit_of::<M>(tree, id, &candidate));
+    fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>) {
+        self.0[ray] = nearest.map_or(Hit::MISS, |(id, candidate)| hit_of::<M>(tree, id, &candidate));
     }
 }
 
@@ -276,7 +262,7 @@ fn take_nearer(had: &mut Hit, hit: Hit) {
 #[inline(never)]
 fn hit_of_one<M: Mode>(tree: &Resident<'_, M::Record>, ray: &Ray, primitive: u32) -> Hit {
     let record = &tree.records[primitive as usize];
-    let test = M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1);
+    let test = M::alone(ray);
     let candidate = test.test(record, true);
     if !(candidate.inside && ray.tnear <= candidate.t && candidate.t <= f32::MAX.min(ray.tfar)) {
         return Hit::MISS;
@@ -307,13 +293,7 @@ impl Told for Any<'_> {
 
 impl OfFlights for Any<'_> {
     #[inline(always)]
-    fn decide<M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        test: &M::Alone,
-        ray: &Ray,
-        flight: &Flight,
-    ) {
-        self.0[flight.ray as usize] = flight.nearest::<M>(test, tree.records, ray).is_some();
+    fn decide<M: Mode>(&mut self, _: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>) {
+        self.0[ray] = nearest.is_some();
     }
 }

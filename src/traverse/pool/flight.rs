@@ -33,6 +33,9 @@ pub struct Flight {
     first: [f32; 2 * MOST],
 }
 
+/// The nearest triangle that a ray hits, and where.
+pub type Nearest = (u32, Candidate<1, f32>);
+
 /// What a ray finds in a chunk.
 pub struct Finds {
     /// Whether it may hit anything there.
@@ -171,7 +174,7 @@ impl Flight {
     #[cold]
     #[inline(never)]
     pub fn settle<M: Mode>(&mut self, records: &[M::Record], ray: &Ray) {
-        let nearest = self.nearest::<M>(&test_of::<M>(ray), records, ray);
+        let nearest = self.nearest::<M>(&M::alone(ray), records, ray);
         self.count = 0;
         if let Some((id, Candidate { t, .. })) = nearest {
             (self.ids[0], self.first[0], self.count) = (id as i32, t, 1);
@@ -181,14 +184,9 @@ impl Flight {
 
     /// The nearest of what is listed, by the mode's own test, and the lowest id of several as near.
     #[inline(always)]
-    pub fn nearest<M: Mode>(
-        &self,
-        test: &M::Alone,
-        records: &[M::Record],
-        ray: &Ray,
-    ) -> Option<(u32, Candidate<1, f32>)> {
+    pub fn nearest<M: Mode>(&self, test: &M::Alone, records: &[M::Record], ray: &Ray) -> Option<Nearest> {
         let tfar = f32::MAX.min(ray.tfar);
-        let mut best: Option<(u32, Candidate<1, f32>)> = None;
+        let mut best: Option<Nearest> = None;
         for id in self.left() {
             let candidate = test.test(&records[id as usize], true);
             let t = candidate.t;
@@ -200,10 +198,4 @@ impl Flight {
         }
         best
     }
-}
-
-/// What the mode's test of one triangle asks of a ray.
-#[inline(always)]
-pub fn test_of<M: Mode>(ray: &Ray) -> M::Alone {
-    M::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1)
 }

@@ -152,11 +152,7 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
             let top = flight.top as usize;
             let at = (top, Way(waiting.exits[top]));
             let Flight { slabs, tnear, tfar, .. } = flight;
-            let (top, way) = if A::ANY {
-                step::<S::F8, true>(ways.nodes, slabs, waiting, at, *tnear, *tfar)
-            } else {
-                step::<S::F8, false>(ways.nodes, slabs, waiting, at, *tnear, *tfar)
-            };
+            let (top, way) = step::<S::F8>(ways.nodes, slabs, waiting, at, *tnear, *tfar, A::ANY);
             flight.top = top as u32;
             at_chunk.put_if(k, ways.fetch(way.0));
         }

@@ -57,28 +57,26 @@ pub fn thick<const W: usize, L: Lanes<W>>(origin: L, inverse: L, margin: L) -> [
 }
 
 /// Takes a node, which was on top of a stack, puts there the boxes that the ray goes into between its ends, and gives the new
-/// top and what is there. With `ANY`, nobody asks which of them is nearest, nor where the ray enters them.
+/// top and what is there. With `any`, nobody asks which of them is nearest, nor where the ray enters them.
 #[inline(always)]
-pub fn step<L: Eight, const ANY: bool>(
+pub fn step<L: Eight>(
     nodes: &[Boxes],
     ray: &Slabs,
     waiting: &mut Waiting,
     (top, way): (usize, Way),
     tnear: f32,
     tfar: f32,
+    any: bool,
 ) -> (usize, Way) {
     let node = &nodes[way.node()];
-    let Met { ways, nibbles, enters, bits } = meet::<L, ANY>(node, ray, tnear, tfar);
-    L::ids_compact(ways, bits, eight(&mut waiting.exits, top));
-    if !ANY {
-        enters.compact(bits, eight(&mut waiting.tmin, top));
-    }
+    let met = meet::<L>(node, ray, tnear, tfar, any);
+    let count = met.put(waiting, top, any);
     // What is on top now is known before it can be read there.
     let before = waiting.exits[top - 1];
-    let last = (bits | 1).ilog2();
-    let next = node.ways[if ANY { last & 7 } else { nibbles >> (4 * last) & 7 } as usize];
-    let way = select_unpredictable(bits == 0, before, next);
-    (top + bits.count_ones() as usize - 1, Way(way))
+    let last = (met.bits | 1).ilog2();
+    let next = node.ways[if any { last & 7 } else { met.nibbles >> (4 * last) & 7 } as usize];
+    let way = select_unpredictable(count == 0, before, next);
+    (top + count - 1, Way(way))
 }
 
 /// The boxes of a node that a ray goes into, the farthest first, or as the node has them.
@@ -93,9 +91,22 @@ pub struct Met<L: Eight> {
     pub bits: u32,
 }
 
-/// Has a ray meet a node's boxes between its ends. With `ANY` they stay in the order that the node has them in.
+impl<L: Eight> Met<L> {
+    /// Puts those that the ray goes into on a stack, from a place on, and where it enters them unless it asks for `any` hit; how many
+    /// they are.
+    #[inline(always)]
+    pub fn put(&self, waiting: &mut Waiting, place: usize, any: bool) -> usize {
+        L::ids_compact(self.ways, self.bits, eight(&mut waiting.exits, place));
+        if !any {
+            self.enters.compact(self.bits, eight(&mut waiting.tmin, place));
+        }
+        self.bits.count_ones() as usize
+    }
+}
+
+/// Has a ray meet a node's boxes between its ends. With `any` they stay in the order that the node has them in.
 #[inline(always)]
-pub fn meet<L: Eight, const ANY: bool>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32) -> Met<L> {
+pub fn meet<L: Eight>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32, any: bool) -> Met<L> {
     let Boxes { faces: [x, y, z], orders, .. } = node;
     // Where the ray enters each box, and where it leaves it.
     let octant = ray.octant as usize;
@@ -112,7 +123,7 @@ pub fn meet<L: Eight, const ANY: bool>(node: &Boxes, ray: &Slabs, tnear: f32, tf
     let leaves = leaves_x.min(leaves_y).min(leaves_z.min(L::splat(tfar)));
 
     let ways = L::ids_load(&node.ways);
-    if ANY {
+    if any {
         return Met { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
     }
     // The farthest first.
@@ -151,13 +162,13 @@ mod tests {
             let nodes = std::slice::from_ref(node);
             let at = (3, Way::ROOT);
             let (top, way) =
-                step::<S::F8, false>(nodes, &starts.slabs(0), &mut waiting, at, ray.tnear, ray.tfar);
+                step::<S::F8>(nodes, &starts.slabs(0), &mut waiting, at, ray.tnear, ray.tfar, false);
             assert_eq!(way.0, waiting.exits[top]);
             // Who asks for any hit goes the same ways, in whatever order.
             let mut any = Waiting::new();
             any.exits[3] = Way::ROOT.0;
             let (any_top, any_way) =
-                step::<S::F8, true>(nodes, &starts.slabs(0), &mut any, at, ray.tnear, ray.tfar);
+                step::<S::F8>(nodes, &starts.slabs(0), &mut any, at, ray.tnear, ray.tfar, true);
             assert_eq!(any_way.0, any.exits[any_top]);
             let sorted = |waiting: &Waiting, top: usize| {
                 let mut ways = waiting.exits[3..=top].to_vec();

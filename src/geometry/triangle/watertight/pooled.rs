@@ -134,8 +134,8 @@ impl Pooled {
     }
 
     /// What the ray may find between `tnear` and `tfar`. With `SIGNS`, signs of edge functions are right if they are not
-    /// zero; otherwise they are if those are beyond their error bounds. With `EARLY`, nobody asks where where signs say that nothing
-    /// may be hit.
+    /// zero; otherwise they are if those are beyond their error bounds. With `EARLY`, and if those are enough,
+    /// nobody asks for bounds where they say that nothing is hit.
     #[inline(always)]
     pub fn prospects<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
         &self,
