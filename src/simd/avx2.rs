@@ -7,7 +7,7 @@
 //! machine has been asked. So wherever a method of these types runs, the machine has AVX2.
 
 use super::eight::{Eight, LANES_OF};
-use super::lanes::{Lanes, Mask, Simd};
+use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::pair::Pair;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -148,6 +148,19 @@ macro_rules! avx2_lanes {
                 let mut values = [0; $width];
                 avx!($istore(values.as_mut_ptr().cast(), ids));
                 values
+            }
+            #[inline(always)]
+            fn tag(self, ids: $int) -> $int {
+                let tags = avx!($to_float($iset(TAGS)));
+                avx!($to_int($or($andnot(tags, self.0), $and(tags, $to_float(ids)))))
+            }
+            #[inline(always)]
+            fn of_tagged(tagged: $int) -> Self {
+                Self(avx!($andnot($to_float($iset(TAGS)), $to_float(tagged))))
+            }
+            #[inline(always)]
+            fn tags(tagged: $int) -> $int {
+                avx!($iand($iset(TAGS), tagged))
             }
         }
     };

@@ -5,7 +5,7 @@
 //! the `#[target_feature]` entry that a [`super::Chosen`] reaches after the machine was asked.
 
 use super::avx2;
-use super::lanes::{Lanes, Mask, Simd};
+use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::sixteen::Sixteen;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -170,6 +170,20 @@ impl Lanes<16> for F32x16 {
         let mut values = [0; 16];
         avx512!(_mm512_storeu_si512(values.as_mut_ptr().cast(), ids));
         values
+    }
+    #[inline(always)]
+    fn tag(self, ids: __m512i) -> __m512i {
+        // Of three bits, the third one where the first is set, the second one elsewhere.
+        let tags = Self::ids(TAGS);
+        avx512!(_mm512_ternarylogic_epi32::<0b1010_1100>(tags, _mm512_castps_si512(self.0), ids))
+    }
+    #[inline(always)]
+    fn of_tagged(tagged: __m512i) -> Self {
+        Self(avx512!(_mm512_castsi512_ps(_mm512_andnot_si512(Self::ids(TAGS), tagged))))
+    }
+    #[inline(always)]
+    fn tags(tagged: __m512i) -> __m512i {
+        avx512!(_mm512_and_si512(Self::ids(TAGS), tagged))
     }
 }
 

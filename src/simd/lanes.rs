@@ -85,7 +85,20 @@ pub trait Lanes<const W: usize>:
     fn ids_select(mask: Self::Mask, a: Self::Ids, b: Self::Ids) -> Self::Ids;
     /// Lane `i` becomes element `i`.
     fn ids_store(ids: Self::Ids) -> [i32; W];
+
+    /// The last [`TAG`] bits of each id, and before them the first bits of each lane.
+    fn tag(self, ids: Self::Ids) -> Self::Ids;
+    /// The lanes that were tagged, rounded toward zero: zeros in place of ids.
+    fn of_tagged(tagged: Self::Ids) -> Self;
+    /// The ids that they were tagged with.
+    fn tags(tagged: Self::Ids) -> Self::Ids;
 }
+
+/// Bits of an id that a float can be [tagged](Lanes::tag) with. Nine of its digits are left.
+pub const TAG: u32 = 14;
+
+/// The bits of an id.
+pub const TAGS: i32 = (1 << TAG) - 1;
 
 /// Folds lanes by halves, as registers do it best. `W` is a power of two.
 #[inline(always)]

@@ -37,7 +37,7 @@ pub use branch::stay_a_branch;
 pub use dense::Dense;
 pub use eight::Eight;
 pub use isa::{Chosen, Isa, Task};
-pub use lanes::{Lanes, Mask, Simd};
+pub use lanes::{Lanes, Mask, Simd, TAG, TAGS};
 pub use prefetch::{prefetch, prefetch_both};
 pub use sixteen::Sixteen;
 

@@ -145,6 +145,18 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
     fn ids_store(ids: Self::Ids) -> [i32; 16] {
         joined(L::ids_store(ids.0), L::ids_store(ids.1))
     }
+    #[inline(always)]
+    fn tag(self, ids: Self::Ids) -> Self::Ids {
+        Pair(self.0.tag(ids.0), self.1.tag(ids.1))
+    }
+    #[inline(always)]
+    fn of_tagged(tagged: Self::Ids) -> Self {
+        Self(L::of_tagged(tagged.0), L::of_tagged(tagged.1))
+    }
+    #[inline(always)]
+    fn tags(tagged: Self::Ids) -> Self::Ids {
+        Pair(L::tags(tagged.0), L::tags(tagged.1))
+    }
 }
 
 impl<L: Eight> Sixteen for Pair<L> {

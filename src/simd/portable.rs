@@ -1,7 +1,7 @@
 //! The portable implementation, through `wide`: SSE2 on x86-64, NEON on AArch64, and so on.
 
 use super::eight::Eight;
-use super::lanes::{Lanes, Mask, Simd};
+use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::sixteen::Sixteen;
 use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -120,6 +120,20 @@ macro_rules! portable_lanes {
             #[inline(always)]
             fn ids_store(ids: wide::$int) -> [i32; $width] {
                 ids.to_array()
+            }
+            #[inline(always)]
+            fn tag(self, ids: wide::$int) -> wide::$int {
+                let tags = wide::$int::splat(TAGS);
+                let bits: wide::$int = cast(self.0);
+                (bits & !tags) | (ids & tags)
+            }
+            #[inline(always)]
+            fn of_tagged(tagged: wide::$int) -> Self {
+                Self(cast(tagged & wide::$int::splat(!TAGS)))
+            }
+            #[inline(always)]
+            fn tags(tagged: wide::$int) -> wide::$int {
+                tagged & wide::$int::splat(TAGS)
             }
         }
     };

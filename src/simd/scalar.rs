@@ -1,6 +1,6 @@
 //! One lane: a plain `f32`. The single-ray kernel is the packet kernel over this.
 
-use super::lanes::{Lanes, Mask};
+use super::lanes::{Lanes, Mask, TAGS};
 
 impl Mask for bool {
     #[inline(always)]
@@ -76,5 +76,17 @@ impl Lanes<1> for f32 {
     #[inline(always)]
     fn ids_store(ids: i32) -> [i32; 1] {
         [ids]
+    }
+    #[inline(always)]
+    fn tag(self, ids: i32) -> i32 {
+        self.to_bits() as i32 & !TAGS | ids & TAGS
+    }
+    #[inline(always)]
+    fn of_tagged(tagged: i32) -> Self {
+        f32::from_bits((tagged & !TAGS) as u32)
+    }
+    #[inline(always)]
+    fn tags(tagged: i32) -> i32 {
+        tagged & TAGS
     }
 }

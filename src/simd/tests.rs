@@ -68,6 +68,13 @@ fn check<const W: usize, L: Lanes<W>>() {
             assert_eq!(id, if pattern >> i & 1 == 1 { shift as i32 } else { i32::MAX });
         }
         assert_eq!(L::ids_less(ids, L::ids(shift as i32 + 1)).bits() & full, pattern);
+
+        // Of an id only the last bits count.
+        let tagged = x.tag(ids);
+        let (begins, tags) = (L::of_tagged(tagged).store(), L::ids_store(L::tags(tagged)));
+        for (i, (begin, id)) in begins.into_iter().zip(L::ids_store(ids)).enumerate() {
+            assert_eq!((begin.to_bits(), tags[i]), (a[i].to_bits() >> TAG << TAG, id & TAGS));
+        }
     }
 }
 

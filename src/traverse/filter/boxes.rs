@@ -18,7 +18,8 @@ use crate::traverse::pool::step::{Met, meet, thick};
 
 /// Rays of a list as boxes see them.
 struct Seen<const W: usize, L: Lanes<W>> {
-    ids: L::Ids,
+    /// Their words in the list.
+    words: L::Ids,
     /// Those of which something is left.
     live: u32,
     /// 1 / direction.
@@ -35,16 +36,17 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
     /// The rays of up to `W` entries.
     #[inline(always)]
     fn new<const ANY: bool>(lot: &Lot, entries: &Entries, at: usize, count: usize) -> Self {
-        let (ids, tmin) = entries.starts::<W, L>(at);
-        let crossing = lot.crossing::<W, L>(&ids);
-        let tmin = if ANY { crossing.begin } else { tmin };
+        let words = entries.words(at);
+        let crossing = lot.crossing::<W, L>(words);
+        let words = L::ids_of(words);
+        let tmin = if ANY { crossing.begin } else { L::of_tagged(words) };
         let ([mut near, mut far], closest) = ([[tmin; 3]; 2], crossing.closest);
         for axis in 0..3 {
             [near[axis], far[axis]] =
                 thick(crossing.origin[axis], crossing.inverse[axis], crossing.margin[axis]);
         }
         let live = tmin.le(closest).bits() & present(count.min(W));
-        Self { ids: L::ids_of(&ids), live, inverse: crossing.inverse, near, far, tmin, closest }
+        Self { words, live, inverse: crossing.inverse, near, far, tmin, closest }
     }
 
     /// The rays that go into a box, and where they enter it.
@@ -68,14 +70,10 @@ fn write<const W: usize, L: Dense<W>, const ANY: bool>(
     entries: &mut Entries,
     at: usize,
     bits: u32,
-    ids: L::Ids,
+    words: L::Ids,
     enters: L,
 ) {
-    if ANY {
-        entries.write_ids::<W, L>(at, bits, ids);
-    } else {
-        entries.write_starts::<W, L>(at, bits, ids, enters);
-    }
+    entries.write_starts::<W, L>(at, bits, if ANY { words } else { enters.tag(words) });
 }
 
 /// Has a list meet a node's boxes, and puts what comes out on the stack, the nearest on top.
@@ -97,7 +95,7 @@ pub fn cut<const W: usize, L: Dense<W>, const ANY: bool>(
         for &lane in &lanes {
             let (bits, enters) = seen.meet(node, octant, lane);
             let count = bits.count_ones() as usize;
-            write::<W, L, ANY>(entries, next, bits, seen.ids, enters);
+            write::<W, L, ANY>(entries, next, bits, seen.words, enters);
             heads.push(node.ways[lane], next, count);
             next += count;
         }
@@ -114,7 +112,7 @@ pub fn cut<const W: usize, L: Dense<W>, const ANY: bool>(
         }
         for (place, &lane) in lanes.iter().enumerate() {
             let (bits, enters) = seen.meet(node, octant, lane);
-            write::<W, L, ANY>(entries, next[place], bits, seen.ids, enters);
+            write::<W, L, ANY>(entries, next[place], bits, seen.words, enters);
             next[place] += bits.count_ones() as usize;
         }
     }
@@ -133,14 +131,14 @@ pub fn take_one<L: Eight, const ANY: bool>(
     list: &List,
 ) {
     let at = list.at as usize;
-    let (id, tmin, _) = entries.one(at);
-    let (slabs, closest) = lot.slabs(id);
-    let tmin = if ANY { lot.begin(id) } else { tmin };
+    let (word, tmin, _) = entries.one(at);
+    let (slabs, closest) = lot.slabs(word);
+    let tmin = if ANY { lot.begin(word) } else { tmin };
     let Met { ways, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest, false);
     if ANY {
-        entries.write_id(at, id);
+        entries.write_one(at, word);
     } else {
-        entries.write_starts_of(at, bits, id, enters);
+        entries.write_starts::<8, L>(at, bits, enters.tag(L::ids(word)));
     }
     heads.push_each::<L>(ways, bits, at);
 }

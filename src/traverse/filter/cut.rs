@@ -99,14 +99,16 @@ pub fn cut<const W: usize, L: Dense<W>, F: Eight>(
     let (at, len) = (list.at as usize, list.len as usize);
     if len <= W {
         // All are in registers, and what comes out takes their place.
-        let (ids, tmin, tmax) = entries.load::<W, L>(at);
-        let crossing = lot.crossing::<W, L>(&ids);
+        let (words, tmax) = entries.load::<W, L>(at);
+        let crossing = lot.crossing::<W, L>(words);
+        let words = L::ids_of(words);
+        let tmin = L::of_tagged(words);
         let tmax = crossing.closest.min(tmax);
         let live = tmin.le(tmax).bits() & present(len);
         if live == 0 {
             return;
         }
-        let mut few = Few { ids: L::ids_of(&ids), live, next: at, entries, heads };
+        let mut few = Few { words, live, next: at, entries, heads };
         seen.all(&crossing, (tmin, tmax), &mut few);
         return;
     }
@@ -116,11 +118,13 @@ pub fn cut<const W: usize, L: Dense<W>, F: Eight>(
     let mut next = begin;
     let mut done = 0;
     while done < len {
-        let (ids, tmin, tmax) = entries.load::<W, L>(at + done);
-        let crossing = lot.crossing::<W, L>(&ids);
+        let (words, tmax) = entries.load::<W, L>(at + done);
+        let crossing = lot.crossing::<W, L>(words);
+        let words = L::ids_of(words);
+        let tmin = L::of_tagged(words);
         let tmax = crossing.closest.min(tmax);
         let live = tmin.le(tmax).bits() & present((len - done).min(W));
-        let mut many = Many { ids: L::ids_of(&ids), live, next: &mut next, entries };
+        let mut many = Many { words, live, next: &mut next, entries };
         seen.all(&crossing, (tmin, tmax), &mut many);
         done += W;
     }
@@ -133,11 +137,11 @@ pub fn cut<const W: usize, L: Dense<W>, F: Eight>(
 #[inline(always)]
 pub fn take_one<L: Eight>(line: &Line, lot: &Lot, entries: &mut Entries, heads: &mut Heads, list: &List) {
     let at = list.at as usize;
-    let (id, tmin, tmax) = entries.one(at);
-    let (planes, closest) = lot.planes::<L>(id, line);
+    let (word, tmin, tmax) = entries.one(at);
+    let (planes, closest) = lot.planes::<L>(word, line);
     let tmax = L::splat(tmax).min(L::splat(closest));
     let taken = take::<L>(line, &planes, 0, L::splat(tmin), tmax);
-    entries.write_each(at, taken.bits, id, taken.tmin, taken.tmax);
+    entries.write_each(at, taken.bits, word, taken.tmin, taken.tmax);
     heads.push_each::<L>(taken.exits, taken.bits, at);
 }
 
@@ -154,7 +158,7 @@ trait Take<const W: usize, L: Dense<W>> {
 
 /// Rays that fit into a register: lists one behind the other.
 struct Few<'a, const W: usize, L: Dense<W>> {
-    ids: L::Ids,
+    words: L::Ids,
     live: u32,
     next: usize,
     entries: &'a mut Entries,
@@ -166,7 +170,7 @@ impl<const W: usize, L: Dense<W>> Take<W, L> for Few<'_, W, L> {
     fn take(&mut self, order: usize, seen: &Seen, (tmin, tmax): (L, L)) {
         let bits = tmin.le(tmax).bits() & self.live & seen.leads(order);
         let count = bits.count_ones() as usize;
-        self.entries.write::<W, L>(self.next, bits, self.ids, tmin, tmax);
+        self.entries.write::<W, L>(self.next, bits, tmin.tag(self.words), tmax);
         self.heads.push(seen.exits[order], self.next, count);
         self.next += count;
     }
@@ -174,7 +178,7 @@ impl<const W: usize, L: Dense<W>> Take<W, L> for Few<'_, W, L> {
 
 /// Some of the rays of a longer list: each exit's has a place of its own.
 struct Many<'a, const W: usize, L: Dense<W>> {
-    ids: L::Ids,
+    words: L::Ids,
     live: u32,
     next: &'a mut [usize; 8],
     entries: &'a mut Entries,
@@ -184,7 +188,7 @@ impl<const W: usize, L: Dense<W>> Take<W, L> for Many<'_, W, L> {
     #[inline(always)]
     fn take(&mut self, order: usize, seen: &Seen, (tmin, tmax): (L, L)) {
         let bits = tmin.le(tmax).bits() & self.live & seen.leads(order);
-        self.entries.write::<W, L>(self.next[order], bits, self.ids, tmin, tmax);
+        self.entries.write::<W, L>(self.next[order], bits, tmin.tag(self.words), tmax);
         self.next[order] += bits.count_ones() as usize;
     }
 }

@@ -33,14 +33,15 @@ pub fn test<'a, const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
     let (at, len) = (list.at as usize, list.len as usize);
     let mut done = 0;
     while done < len {
-        let (ids, tmin) = entries.starts::<W, L>(at + done);
-        let (mut closest, origin) = lot.found::<W, L>(&ids);
+        let ids = entries.words::<W>(at + done);
+        let (mut closest, origin) = lot.found::<W, L>(ids);
+        let tmin = L::of_tagged(L::ids_of(ids));
         let live = tmin.le(closest.t).bits() & present((len - done).min(W));
         done += W;
         if live == 0 {
             continue;
         }
-        let [x, y, z, tnear] = lot.ways::<W, L>(&ids);
+        let [x, y, z, tnear] = lot.ways::<W, L>(ids);
         let test = M::Test::<W, L>::new(&origin, &[x, y, z], live);
         let lanes = L::mask_from_bits(live);
         let mut changed = false;
@@ -61,7 +62,7 @@ pub fn test<'a, const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
             }
         }
         if changed {
-            lot.keep(&ids, live, &closest);
+            lot.keep(ids, live, &closest);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The stack of lists: rays that wait at places of the tree, with their intervals there.
 
 use super::lot::LOT;
-use crate::simd::{Dense, Eight};
+use crate::simd::{Dense, Eight, Lanes};
 
 /// Lines, or nodes of boxes, on a way from the root to a leaf. (A line is three levels, a node of boxes can be one.)
 const LEVELS: usize = crate::kdtree::MAX_DEPTH;
@@ -49,12 +49,15 @@ pub struct Heads {
     count: usize,
 }
 
-/// Their entries: a ray's number and its interval. What stands behind a list's last one means nothing.
+/// Their entries: a ray and its interval. What stands behind a list's last one means nothing.
+///
+/// A ray's number and where its interval begins are one word ([`Lanes::tag`](crate::simd::Lanes::tag)): each is written once for each box that is met,
+/// at any place of a line of the cache. So a beginning, which is not negative, is rounded down to nine digits: that says somewhat later of a ray
+/// that it is done, and is no matter otherwise.
 ///
 /// Memory that was never written takes none: of what could wait, a hundredth does.
 pub struct Entries {
-    ids: Box<[i32; ENTRIES + SLACK]>,
-    tmin: Box<[f32; ENTRIES + SLACK]>,
+    words: Box<[i32; ENTRIES + SLACK]>,
     tmax: Box<[f32; ENTRIES + SLACK]>,
 }
 
@@ -109,89 +112,64 @@ impl Entries {
     pub fn new() -> Self {
         let room = "as many as asked for";
         Self {
-            ids: vec![0; ENTRIES + SLACK].try_into().expect(room),
-            tmin: vec![0.0; ENTRIES + SLACK].try_into().expect(room),
+            words: vec![0; ENTRIES + SLACK].try_into().expect(room),
             tmax: vec![0.0; ENTRIES + SLACK].try_into().expect(room),
         }
     }
 
-    /// Writes rays of an octant from `at` on, and their intervals inside of the scene's bounds; where the next octant's
+    /// Writes rays of an octant from `at` on, and the ends of their intervals inside of the scene's bounds; where the next octant's
     /// may begin.
     #[inline(always)]
-    pub fn begin(&mut self, ids: &[i32], [tmin, tmax]: [&[f32]; 2], at: usize) -> usize {
-        self.ids[at..][..ids.len()].copy_from_slice(ids);
-        self.tmin[at..][..ids.len()].copy_from_slice(tmin);
-        self.tmax[at..][..ids.len()].copy_from_slice(tmax);
-        at + room(ids.len())
+    pub fn begin(&mut self, words: &[i32], tmax: &[f32], at: usize) -> usize {
+        self.words[at..][..words.len()].copy_from_slice(words);
+        self.tmax[at..][..words.len()].copy_from_slice(tmax);
+        at + room(words.len())
     }
 
-    /// Some rays' numbers, and their intervals.
+    /// Some rays' words, and the ends of their intervals.
     #[inline(always)]
-    pub fn load<const W: usize, L: Dense<W>>(&self, at: usize) -> ([i32; W], L, L) {
-        let (ids, tmin) = self.starts::<W, L>(at);
-        (ids, tmin, L::load(self.tmax[at % ENTRIES..].first_chunk().expect("a register behind each")))
+    pub fn load<const W: usize, L: Dense<W>>(&self, at: usize) -> (&[i32; W], L) {
+        (self.words(at), L::load(self.tmax[at % ENTRIES..].first_chunk().expect("a register behind each")))
     }
 
-    /// Some rays' numbers, and where their intervals begin.
+    /// Some rays' words.
     #[inline(always)]
-    pub fn starts<const W: usize, L: Dense<W>>(&self, at: usize) -> ([i32; W], L) {
-        let (at, room) = (at % ENTRIES, "a register behind each");
-        let ids = *self.ids[at..].first_chunk().expect(room);
-        (ids, L::load(self.tmin[at..].first_chunk().expect(room)))
+    pub fn words<const W: usize>(&self, at: usize) -> &[i32; W] {
+        self.words[at % ENTRIES..].first_chunk().expect("a register behind each")
     }
 
-    /// One ray's number, and its interval.
+    /// One ray's word, and where its interval begins and ends.
     #[inline(always)]
     pub fn one(&self, at: usize) -> (i32, f32, f32) {
         let at = at % ENTRIES;
-        (self.ids[at], self.tmin[at], self.tmax[at])
+        let word = self.words[at];
+        (word, f32::of_tagged(word), self.tmax[at])
     }
 
     /// Writes one ray's intervals whose bits are set one behind the other.
     #[inline(always)]
-    pub fn write_each<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L, tmax: L) {
-        self.write_starts_of(at, bits, id, tmin);
+    pub fn write_each<L: Eight>(&mut self, at: usize, bits: u32, word: i32, tmin: L, tmax: L) {
+        self.write_starts::<8, L>(at, bits, tmin.tag(L::ids(word)));
         tmax.compact(bits, self.tmax[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
     }
 
     /// Writes those of some rays whose bits are set one behind the other.
     #[inline(always)]
-    pub fn write<const W: usize, L: Dense<W>>(
-        &mut self,
-        at: usize,
-        bits: u32,
-        ids: L::Ids,
-        tmin: L,
-        tmax: L,
-    ) {
-        self.write_starts::<W, L>(at, bits, ids, tmin);
+    pub fn write<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, words: L::Ids, tmax: L) {
+        self.write_starts::<W, L>(at, bits, words);
         tmax.close_up(bits, self.tmax[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
     }
 
     /// The same without the ends of the intervals, for who does not ask for them.
     #[inline(always)]
-    pub fn write_starts<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids, tmin: L) {
-        self.write_ids::<W, L>(at, bits, ids);
-        tmin.close_up(bits, self.tmin[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
+    pub fn write_starts<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, words: L::Ids) {
+        let to = self.words[at % ENTRIES..].first_chunk_mut().expect("a register behind each");
+        L::close_up_ids(words, bits, to);
     }
 
-    /// The same without intervals.
+    /// Writes one ray's word at eight places.
     #[inline(always)]
-    pub fn write_ids<const W: usize, L: Dense<W>>(&mut self, at: usize, bits: u32, ids: L::Ids) {
-        let to = self.ids[at % ENTRIES..].first_chunk_mut().expect("a register behind each");
-        L::close_up_ids(ids, bits, to);
-    }
-
-    /// Writes where one ray begins, at several places: those of a register whose bits are set.
-    #[inline(always)]
-    pub fn write_starts_of<L: Eight>(&mut self, at: usize, bits: u32, id: i32, tmin: L) {
-        self.write_id(at, id);
-        tmin.compact(bits, self.tmin[at % ENTRIES..].first_chunk_mut().expect("a register behind each"));
-    }
-
-    /// Writes one ray's number at eight places.
-    #[inline(always)]
-    pub fn write_id(&mut self, at: usize, id: i32) {
-        *self.ids[at % ENTRIES..].first_chunk_mut().expect("a register behind each") = [id; 8];
+    pub fn write_one(&mut self, at: usize, word: i32) {
+        *self.words[at % ENTRIES..].first_chunk_mut().expect("a register behind each") = [word; 8];
     }
 }

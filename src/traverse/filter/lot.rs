@@ -3,7 +3,7 @@
 use crate::geometry::Aabb;
 use crate::geometry::triangle::pooled::{Listed, Pooled, shears};
 use crate::kdtree::Line;
-use crate::simd::{Dense, Eight, Lanes, Mask, Sixteen};
+use crate::simd::{Dense, Eight, Lanes, Mask, Sixteen, TAGS};
 use crate::traverse::closest::{Closest, NONE};
 use crate::traverse::kernel::Kernel;
 use crate::traverse::pool::step::Slabs;
@@ -16,8 +16,11 @@ use std::ops::Range;
 /// Rays in a lot.
 pub const LOT: usize = Kernel::Filter.width();
 
-/// A ray's id is its number in the lot, and of a sheared ray the greatest axis of its direction as well, so many times over.
+/// A ray's id is its number in the lot, and of a sheared ray the greatest axis of its direction as well, so many times over. Whoever
+/// is given an id may be given one that a float is tagged with.
 const AXIS: i32 = LOT as i32;
+
+const _: () = assert!(3 * AXIS <= TAGS + 1);
 
 /// Where a ray ends that is done: before anything.
 pub const DONE: f32 = f32::NEG_INFINITY;
@@ -55,34 +58,32 @@ pub struct Crossing<L> {
 #[derive(Clone)]
 pub struct Octant {
     ids: [i32; LOT + 16],
-    tmin: [f32; LOT + 16],
     tmax: [f32; LOT + 16],
     count: usize,
 }
 
 impl Octant {
-    const NONE: Self = Self { ids: [0; LOT + 16], tmin: [0.0; LOT + 16], tmax: [0.0; LOT + 16], count: 0 };
+    const NONE: Self = Self { ids: [0; LOT + 16], tmax: [0.0; LOT + 16], count: 0 };
 
     /// Puts those rays there whose bits are set.
     #[inline(always)]
     fn put<L: Sixteen>(&mut self, bits: u32, ids: L::Ids, [tmin, tmax]: [L; 2]) {
         let (at, room) = (self.count % (LOT + 1), "a register behind the last");
-        L::ids_compact(ids, bits, self.ids[at..].first_chunk_mut().expect(room));
-        tmin.compact(bits, self.tmin[at..].first_chunk_mut().expect(room));
+        L::ids_compact(tmin.tag(ids), bits, self.ids[at..].first_chunk_mut().expect(room));
         tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
         self.count = at + bits.count_ones() as usize;
     }
 
-    /// Their ids.
+    /// Their ids, each tagged to where the ray begins inside of the scene's bounds.
     #[inline(always)]
     pub fn ids(&self) -> &[i32] {
         &self.ids[..self.count]
     }
 
-    /// Where they begin, and where they end, as far as they are inside of the scene's bounds.
+    /// Where they end inside of the scene's bounds.
     #[inline(always)]
-    pub fn intervals(&self) -> [&[f32]; 2] {
-        [&self.tmin[..self.count], &self.tmax[..self.count]]
+    pub fn tmax(&self) -> &[f32] {
+        &self.tmax[..self.count]
     }
 }
 
@@ -154,8 +155,10 @@ impl Lot {
         let (origin, direction) = ([x, y, z], [dx, dy, dz]);
         let Ready { inverse, reach, tmin, tmax, closest, ordinary, flies, .. } =
             Ready::new(&origin, &direction, tnear, tfar, bounds);
+        // Beginnings that are tagged are not negative.
+        let ordinary = ordinary & L::splat(0.0).le(tnear).bits();
         self.odd[of_lot] = (!ordinary & present) as u16;
-        let flies = flies & present;
+        let flies = flies & ordinary & present;
         let fly = L::mask_from_bits(flies);
 
         // Who does not fly has found nothing, wherever it ends.
@@ -256,7 +259,7 @@ impl Lot {
         let place = Self::place(id);
         let Traveller { start: [x, y, z, closest], .. } = self.travellers[place];
         let [sx, sy, scale, tnear] = self.ways[place];
-        let axis = (id / AXIS) as usize;
+        let axis = ((id & TAGS) / AXIS) as usize;
         (Pooled::of_shear(&[x, y, z], [sx, sy, scale], axis), [tnear, closest])
     }
 
@@ -270,7 +273,7 @@ impl Lot {
         }
         let [x, y, z, closest] = L::columns(&starts);
         let [sx, sy, scale, tnear] = self.ways::<W, L>(ids);
-        let ids = L::ids_of(ids);
+        let ids = L::tags(L::ids_of(ids));
         let axes = [L::ids_less(ids, L::ids(AXIS)), L::ids_less(ids, L::ids(2 * AXIS))];
         (Listed::new(&[x, y, z], [sx, sy, scale], axes), [tnear, closest])
     }

@@ -127,9 +127,9 @@ pub fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
 ) {
     let (at, len) = (list.at as usize, list.len as usize);
     for done in (0..len).step_by(W) {
-        let (ids, tmin) = entries.starts::<W, L>(at + done);
-        let (rays, [tnear, before]) = lot.listed::<W, L>(&ids);
-        let tmin = if ANY { tnear } else { tmin };
+        let ids = entries.words::<W>(at + done);
+        let (rays, [tnear, before]) = lot.listed::<W, L>(ids);
+        let tmin = if ANY { tnear } else { L::of_tagged(L::ids_of(ids)) };
         let mut live = tmin.le(before).bits() & present((len - done).min(W));
         if live == 0 {
             continue;
@@ -170,7 +170,7 @@ pub fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
                     closest = L::select(nearer, last, closest);
                     changed |= nearer.bits();
                 }
-                candidates.add(possible, L::ids_of(&ids), L::ids(chunk.ids()[triangle]), first);
+                candidates.add(possible, L::ids_of(ids), L::ids(chunk.ids()[triangle]), first);
             }
             if ANY && live == 0 {
                 break;
@@ -183,7 +183,7 @@ pub fn meet<const W: usize, L: Dense<W>, M: Mode, const ANY: bool>(
             }
         } else if changed != 0 {
             let closest = closest.store();
-            lot.keep_each(&ids, changed, |lane| (closest[lane], NONE));
+            lot.keep_each(ids, changed, |lane| (closest[lane], NONE));
         }
     }
 }

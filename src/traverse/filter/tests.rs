@@ -7,7 +7,7 @@ use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, Exit, Tree};
 use crate::mesh::Mesh;
 use crate::mesh::generate::shapes;
-use crate::simd::{Chosen, Isa, Simd, Task};
+use crate::simd::{Chosen, Isa, Simd, TAGS, Task};
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::source::Source;
 use crate::traverse::{Accel, Kernel, RayPacket};
@@ -91,12 +91,11 @@ impl Cuts<'_> {
         lot.prepare::<S::F16, false, ANY>(Source::Slice(rays), sixteens, accel.tree().bounds());
         let (mut entries, mut heads, mut found) = (Entries::new(), Heads::new(), Vec::new());
         for octant in 0..8 {
-            let (ids, [tmin, tmax]) = (lot.octant(octant).ids(), lot.octant(octant).intervals());
+            let (ids, tmax) = (lot.octant(octant).ids(), lot.octant(octant).tmax());
             for (i, exit) in places.clone().enumerate() {
                 let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
                 let begin = |entries: &mut Entries, rays: Range<usize>| {
-                    let intervals = [&tmin[rays.clone()], &tmax[rays.clone()]];
-                    entries.begin(&ids[rays.clone()], intervals, 0);
+                    entries.begin(&ids[rays.clone()], &tmax[rays.clone()], 0);
                     List { exit, at: 0, len: rays.len() as u32 }
                 };
                 let list = begin(&mut entries, 0..len);
@@ -131,8 +130,8 @@ fn all(entries: &Entries, heads: &mut Heads) -> Waiting {
     let mut all = Vec::new();
     while let Some(list) = heads.pop() {
         for i in 0..list.len {
-            let (id, tmin, tmax) = entries.one((list.at + i) as usize);
-            all.push((list.exit, id, [tmin.to_bits(), tmax.to_bits()]));
+            let (word, tmin, tmax) = entries.one((list.at + i) as usize);
+            all.push((list.exit, word & TAGS, [tmin.to_bits(), tmax.to_bits()]));
         }
     }
     all
