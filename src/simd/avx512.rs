@@ -187,6 +187,13 @@ impl Lanes<16> for F32x16 {
     }
 }
 
+/// Four lanes from `4 * part` on, each four times.
+#[inline(always)]
+fn quarters(part: usize) -> __m512i {
+    let order = avx512!(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3));
+    avx512!(_mm512_add_epi32(_mm512_set1_epi32(4 * part as i32), order))
+}
+
 /// Four fours side by side.
 #[inline(always)]
 fn side_by_side(fours: [&[f32; 4]; 4]) -> __m512 {
@@ -254,6 +261,22 @@ impl Sixteen for F32x16 {
         avx2::F32x8(avx512!(_mm512_castps512_ps256(_mm512_permutexvar_ps(ids, self.0))))
     }
     #[inline(always)]
+    fn of_half(half: avx2::F32x8) -> Self {
+        Self(avx512!(_mm512_castps256_ps512(half.0)))
+    }
+    #[inline(always)]
+    fn side_by_side(fours: [&[f32; 4]; 4]) -> Self {
+        Self(side_by_side(fours))
+    }
+    #[inline(always)]
+    fn ids_of_four(ids: &[i32; 4]) -> __m512i {
+        avx512!(_mm512_broadcast_i32x4(_mm_loadu_si128(ids.as_ptr().cast())))
+    }
+    #[inline(always)]
+    fn ids_spread(ids: __m256i, part: usize) -> __m512i {
+        avx512!(_mm512_permutexvar_epi32(quarters(part), _mm512_castsi256_si512(ids)))
+    }
+    #[inline(always)]
     fn ids_load(ids: &[i32; 16]) -> __m512i {
         avx512!(_mm512_loadu_si512(ids.as_ptr().cast()))
     }
@@ -288,9 +311,7 @@ impl Sixteen for F32x16 {
     }
     #[inline(always)]
     fn spread(self, part: usize) -> Self {
-        let first = avx512!(_mm512_set1_epi32(4 * part as i32));
-        let order = avx512!(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3));
-        Self(avx512!(_mm512_permutexvar_ps(_mm512_add_epi32(first, order), self.0)))
+        Self(avx512!(_mm512_permutexvar_ps(quarters(part), self.0)))
     }
     #[inline(always)]
     fn least_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {

@@ -22,6 +22,24 @@ pub trait Sixteen: Lanes<16> {
         Self::Half::load(&picked)
     }
 
+    /// The lanes of a half, and behind them any others.
+    #[inline(always)]
+    fn of_half(half: Self::Half) -> Self {
+        let mut values = [0.0; 16];
+        values[..8].copy_from_slice(&half.store());
+        Self::load(&values)
+    }
+
+    /// Lane `i` is number `i % 4` of `fours[i / 4]`.
+    #[inline(always)]
+    fn side_by_side(fours: [&[f32; 4]; 4]) -> Self {
+        let mut values = [0.0; 16];
+        for lane in 0..16 {
+            values[lane] = fours[lane / 4][lane % 4];
+        }
+        Self::load(&values)
+    }
+
     /// Rows and columns exchanged: lane `j` of vector `i` is number `i` of `fours[j]`.
     #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
@@ -49,6 +67,26 @@ pub trait Sixteen: Lanes<16> {
 
     /// Lane `i` is `ids[i]`.
     fn ids_load(ids: &[i32; 16]) -> Self::Ids;
+
+    /// Lane `i` is `ids[i % 4]`.
+    #[inline(always)]
+    fn ids_of_four(ids: &[i32; 4]) -> Self::Ids {
+        let mut four_times = [0; 16];
+        for lane in 0..16 {
+            four_times[lane] = ids[lane % 4];
+        }
+        Self::ids_load(&four_times)
+    }
+
+    /// Lane `i` is lane `4 * part + i / 4` of a half. `part` is 0 or 1.
+    #[inline(always)]
+    fn ids_spread(ids: <Self::Half as Lanes<8>>::Ids, part: usize) -> Self::Ids {
+        let (half, mut spread) = (Self::Half::ids_store(ids), [0; 16]);
+        for lane in 0..16 {
+            spread[lane] = half[4 * (part & 1) + lane / 4];
+        }
+        Self::ids_load(&spread)
+    }
 
     /// Lane `i` is `ids[i]`, widened without a sign.
     #[inline(always)]

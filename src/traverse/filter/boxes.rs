@@ -11,9 +11,9 @@
 
 use super::cut::present;
 use super::lists::{Entries, Heads, List};
-use super::lot::Lot;
+use super::lot::{Crossing, Lot};
 use crate::kdtree::Boxes;
-use crate::simd::{Dense, Eight, Lanes, Mask};
+use crate::simd::{Dense, Eight, Lanes, Mask, Sixteen};
 use crate::traverse::pool::step::{Met, meet, thick};
 
 /// Rays of a list as boxes see them.
@@ -38,14 +38,19 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
     fn new<const ANY: bool>(lot: &Lot, entries: &Entries, at: usize, count: usize) -> Self {
         let words = entries.words(at);
         let crossing = lot.crossing::<W, L>(words);
-        let words = L::ids_of(words);
+        Self::of::<ANY>(crossing, L::ids_of(words), present(count.min(W)))
+    }
+
+    /// Those that are there of some rays with such words.
+    #[inline(always)]
+    fn of<const ANY: bool>(crossing: Crossing<L>, words: L::Ids, present: u32) -> Self {
         let tmin = if ANY { crossing.begin } else { L::of_tagged(words) };
         let ([mut near, mut far], closest) = ([[tmin; 3]; 2], crossing.closest);
         for axis in 0..3 {
             [near[axis], far[axis]] =
                 thick(crossing.origin[axis], crossing.inverse[axis], crossing.margin[axis]);
         }
-        let live = tmin.le(closest).bits() & present(count.min(W));
+        let live = tmin.le(closest).bits() & present;
         Self { words, live, inverse: crossing.inverse, near, far, tmin, closest }
     }
 
@@ -118,6 +123,55 @@ pub fn cut<const W: usize, L: Dense<W>, const ANY: bool>(
     }
     for (place, &lane) in lanes.iter().enumerate() {
         heads.push(node.ways[lane], begin[place], next[place] - begin[place]);
+    }
+}
+
+/// Takes a list of up to four rays through a node: of sixteen lanes, each four hold what all rays are to one of the boxes.
+///
+/// ```text
+/// lane    0   1   2   3   4   5   6   7   8         15
+///       +---+---+---+---+---+---+---+---+-----  -----+
+/// ray   | 0 | 1 | 2 | 3 | 0 | 1 | 2 | 3 | 0 ...      |      box by box, so that what is closed up is
+/// box   |   farthest    |  next to it   |            |      one list behind the other
+///       +---------------+---------------+-----  -----+
+/// ```
+#[inline(always)]
+pub fn cut_few<L: Sixteen, const ANY: bool>(
+    node: &Boxes,
+    octant: usize,
+    lot: &Lot,
+    entries: &mut Entries,
+    heads: &mut Heads,
+    list: &List,
+) {
+    let at = list.at as usize;
+    let words: &[i32; 4] = entries.words(at);
+    let crossing = lot.crossing_of_four::<L>(words);
+    let words = L::ids_of_four(words);
+    let present = 0x1111 * present(list.len as usize);
+    let seen = Seen::<16, L>::of::<ANY>(crossing, words, present);
+    let order = L::Half::ids_nibbles(node.orders[octant & 7]);
+    let lanes = node.lanes(octant);
+    let mut next = at;
+    for half in 0..2 {
+        let places = L::ids_spread(order, half);
+        let (mut enters, mut leaves) = (seen.tmin, seen.closest);
+        for axis in 0..3 {
+            let (down, faces) = (octant >> axis & 1, &node.faces[axis]);
+            let near = L::of_half(L::Half::load(&faces[down])).pick(places);
+            let far = L::of_half(L::Half::load(&faces[down ^ 1])).pick(places);
+            let first = near.mul_add(seen.inverse[axis], seen.near[axis]);
+            let last = far.mul_add(seen.inverse[axis], seen.far[axis]);
+            // (`max` and `min` keep a NaN that stands on their right.)
+            (enters, leaves) = (first.max(enters), last.min(leaves));
+        }
+        let bits = enters.le(leaves).bits() & seen.live;
+        write::<16, L, ANY>(entries, next, bits, words, enters);
+        for place in 0..4 {
+            let count = (bits >> (4 * place) & 15).count_ones() as usize;
+            heads.push(node.ways[lanes[4 * half + place]], next, count);
+            next += count;
+        }
     }
 }
 

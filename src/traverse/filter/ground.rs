@@ -18,6 +18,9 @@ pub trait Ground {
     /// Lists of so many rays, or fewer, go through a leaf ray by ray.
     const FEW: u32;
 
+    /// Lists of so many rays, or fewer, have a way of their own through an inner place.
+    const SEVERAL: u32;
+
     /// Whether [shears](crate::geometry::triangle::pooled::shears) are kept of rays in place of directions.
     const SHEARS: bool;
 
@@ -41,6 +44,16 @@ pub trait Ground {
 
     /// The same of a longer list, of rays that run into an octant, `W` at a time.
     fn cut<const W: usize, L: Dense<W>, F: Eight, const ANY: bool>(
+        &self,
+        octant: usize,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    );
+
+    /// The same of a list of [up to four](Self::SEVERAL) rays, where sixteen lanes are one register.
+    fn cut_few<L: Sixteen, const ANY: bool>(
         &self,
         octant: usize,
         lot: &Lot,
@@ -86,6 +99,7 @@ impl OfLines<'_> {
 
 impl Ground for OfLines<'_> {
     const FEW: u32 = 0;
+    const SEVERAL: u32 = 0;
     const SHEARS: bool = false;
     const FETCHES: bool = true;
 
@@ -123,6 +137,17 @@ impl Ground for OfLines<'_> {
         list: &List,
     ) {
         cut::cut::<W, L, F>(&self.0.lines()[Exit(list.exit).line()], octant, lot, entries, heads, list);
+    }
+
+    #[inline(always)]
+    fn cut_few<L: Sixteen, const ANY: bool>(
+        &self,
+        _: usize,
+        _: &Lot,
+        _: &mut Entries,
+        _: &mut Heads,
+        _: &List,
+    ) {
     }
 
     #[inline(always)]
@@ -180,6 +205,7 @@ impl<'a> Iterator for Chunks<'a> {
 
 impl Ground for OfBoxes<'_> {
     const FEW: u32 = 3;
+    const SEVERAL: u32 = 4;
     const SHEARS: bool = true;
     const FETCHES: bool = false;
 
@@ -214,6 +240,19 @@ impl Ground for OfBoxes<'_> {
         list: &List,
     ) {
         boxes::cut::<W, L, ANY>(&self.0.nodes[Way(list.exit).node()], octant, lot, entries, heads, list);
+    }
+
+    #[inline(always)]
+    fn cut_few<L: Sixteen, const ANY: bool>(
+        &self,
+        octant: usize,
+        lot: &Lot,
+        entries: &mut Entries,
+        heads: &mut Heads,
+        list: &List,
+    ) {
+        let node = &self.0.nodes[Way(list.exit).node()];
+        boxes::cut_few::<L, ANY>(node, octant, lot, entries, heads, list);
     }
 
     #[inline(always)]

@@ -54,6 +54,9 @@ pub struct Crossing<L> {
     pub begin: L,
 }
 
+/// Where each number stands of four rows of four side by side.
+static COLUMNS: [[i32; 4]; 4] = [[0, 4, 8, 12], [1, 5, 9, 13], [2, 6, 10, 14], [3, 7, 11, 15]];
+
 /// The rays that run into an octant, one after the other, and room for a register.
 #[derive(Clone)]
 pub struct Octant {
@@ -219,8 +222,34 @@ impl Lot {
             let traveller = &self.travellers[Self::place(ids[lane])];
             (starts[lane], inverses[lane]) = (&traveller.start, &traveller.inverse);
         }
-        let [x, y, z, closest] = L::columns(&starts);
-        let [inverse_x, inverse_y, inverse_z, begin] = L::columns(&inverses);
+        self.crossing_of(L::columns(&starts), L::columns(&inverses))
+    }
+
+    /// Four rays as boxes see them, in lanes `4 * i`, `4 * i + 1`, and so on, for each `i`.
+    #[inline(always)]
+    pub fn crossing_of_four<L: Sixteen>(&self, ids: &[i32; 4]) -> Crossing<L> {
+        let travellers = ids.map(|id| &self.travellers[Self::place(id)]);
+        let starts = L::side_by_side(travellers.map(|traveller| &traveller.start));
+        let inverses = L::side_by_side(travellers.map(|traveller| &traveller.inverse));
+        let [first, second, third, fourth] = [
+            L::ids_of_four(&COLUMNS[0]),
+            L::ids_of_four(&COLUMNS[1]),
+            L::ids_of_four(&COLUMNS[2]),
+            L::ids_of_four(&COLUMNS[3]),
+        ];
+        self.crossing_of(
+            [starts.pick(first), starts.pick(second), starts.pick(third), starts.pick(fourth)],
+            [inverses.pick(first), inverses.pick(second), inverses.pick(third), inverses.pick(fourth)],
+        )
+    }
+
+    /// Rays whose numbers stand in columns.
+    #[inline(always)]
+    fn crossing_of<const W: usize, L: Lanes<W>>(
+        &self,
+        [x, y, z, closest]: [L; 4],
+        [inverse_x, inverse_y, inverse_z, begin]: [L; 4],
+    ) -> Crossing<L> {
         let thickness = L::splat(self.thickness);
         let margin = [thickness * inverse_x.abs(), thickness * inverse_y.abs(), thickness * inverse_z.abs()];
         Crossing { origin: [x, y, z], inverse: [inverse_x, inverse_y, inverse_z], margin, closest, begin }

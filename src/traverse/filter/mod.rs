@@ -171,6 +171,8 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, gr
                 let lot = &rays.lot;
                 if list.len == 1 {
                     ground.take_one::<S::F8, ANY>(lot, entries, heads, &list);
+                } else if S::NATIVE == 16 && list.len <= G::SEVERAL {
+                    ground.cut_few::<S::F16, ANY>(octant, lot, entries, heads, &list);
                 } else if wide {
                     ground.cut::<16, S::F16, S::F8, ANY>(octant, lot, entries, heads, &list);
                 } else {

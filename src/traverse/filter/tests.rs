@@ -93,7 +93,7 @@ impl Cuts<'_> {
         for octant in 0..8 {
             let (ids, tmax) = (lot.octant(octant).ids(), lot.octant(octant).tmax());
             for (i, exit) in places.clone().enumerate() {
-                let len = [1, 2, 7, 8, 9, 15, 16, 17, 40, 300][i % 10].min(ids.len());
+                let len = [1, 2, 3, 4, 8, 9, 15, 16, 17, 40, 300][i % 11].min(ids.len());
                 let begin = |entries: &mut Entries, rays: Range<usize>| {
                     entries.begin(&ids[rays.clone()], &tmax[rays.clone()], 0);
                     List { exit, at: 0, len: rays.len() as u32 }
@@ -104,6 +104,11 @@ impl Cuts<'_> {
                 let list = begin(&mut entries, 0..len);
                 ground.cut::<16, S::F16, S::F8, ANY>(octant, &lot, &mut entries, &mut heads, &list);
                 let by_sixteens = all(&entries, &mut heads);
+                if len <= G::SEVERAL as usize {
+                    let list = begin(&mut entries, 0..len);
+                    ground.cut_few::<S::F16, ANY>(octant, &lot, &mut entries, &mut heads, &list);
+                    assert_eq!(all(&entries, &mut heads), by_eights, "{len} rays");
+                }
                 let mut alone = Vec::new();
                 for ray in 0..len {
                     let list = begin(&mut entries, ray..ray + 1);
