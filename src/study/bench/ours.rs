@@ -148,7 +148,7 @@ impl Ours {
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
             let mut dispatch = learnt.take();
-            for ((packets, lanes), out) in rays.tiles(LOT).zip(flags.chunks_mut(LOT)) {
+            for ((packets, lanes), out) in rays.tiles(FIELD).zip(flags.chunks_mut(FIELD)) {
                 dispatch.occluded(accel, &[], packets, lanes, out);
             }
             learnt.put(dispatch);
@@ -272,8 +272,9 @@ pub const MIXED: &str = "mixed";
 /// Packets in a tile.
 const TILE: usize = 16;
 
-/// Packets that a choice is made for at once.
+/// Packets that a choice is made for at once, of rays that look for the closest hit, and of rays that ask for any hit.
 const LOT: usize = 64;
+const FIELD: usize = 4 * LOT;
 
 /// Packets of `W`, all full but perhaps the last.
 struct Packets<const W: usize> {

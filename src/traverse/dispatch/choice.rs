@@ -29,13 +29,15 @@ pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
     /// The kind of place that the next lot is thought to be in.
     here: usize,
-    /// Logarithm (base 2) of the nanoseconds a ray of the last lot took, and of what is usual.
+    /// Logarithm (base 2) of the nanoseconds a ray of the last lot took.
     last: f32,
-    usual: f32,
     /// Lots so far.
     lots: u32,
-    /// Whether the next lot's way was chosen by what is known of its place.
-    by_place: bool,
+    /// Whether what the next lot costs by itself teaches anything: not if its way was chosen by what is known of its place, or if ways
+    /// are compared in duels.
+    teaches: bool,
+    /// Whether somebody compares what is chosen here with something else, so that no slower way is to be tried.
+    pub is_watched: bool,
 }
 
 /// What is known of one kind of place.
@@ -49,18 +51,20 @@ struct Kind<const WAYS: usize> {
     wait: [f32; WAYS],
 }
 
-/// Kinds of place, and the width of each, as a logarithm of times.
-const KINDS: usize = 7;
-const WIDTH: f32 = 0.5;
+/// Kinds of place, and the width of each, as a logarithm of times: from 6 ns a ray to 900.
+const KINDS: usize = 13;
+const WIDTH: f32 = 0.6;
+/// Logarithm of the nanoseconds a ray where the first one ends.
+const FIRST_KIND: f32 = 2.6;
 
 /// How often all ways are tried at the start, there and back (first, second, second, first), so that lots that
 /// grow dearer meanwhile are not taken for a way that is slow.
 const FIRST: u32 = 2;
 
-/// The least that a new figure counts, how much one of a trial does, and one for what is usual.
+/// The least that a new figure counts, how much one of a trial does, and one of a duel.
 const WEIGHT: f32 = 0.07;
 const WEIGHT_OF_TRIAL: f32 = 0.15;
-const WEIGHT_OF_USUAL: f32 = 0.02;
+const WEIGHT_OF_DUEL: f32 = 0.12;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -78,6 +82,10 @@ const MOST_WAIT: f32 = 800.0;
 /// The number of lots after a trial that did better than the quickest way is known to.
 const WAIT_AFTER_SURPRISE: f32 = 4.0;
 
+/// The least number of lots between two duels with a slower way, and the number until the first ones, doubled each time.
+const LEAST_WAIT_OF_DUEL: f32 = 100.0;
+const FIRST_WAIT_OF_DUEL: f32 = 2.0;
+
 /// At a place that is known: one in how many visits tries a way again that is as quick as the quickest, one that was never
 /// tried there, and how many more visits it is for each time that a way is slower, squared.
 const VISITS: f32 = 32.0;
@@ -87,6 +95,9 @@ const VISITS_IF_SLOWER: f32 = 5.0;
 /// One in how many visits takes no heed of the place, so that what is known of ways elsewhere does not grow old.
 const VISITS_AS_ELSEWHERE: u32 = 16;
 
+/// One in how many visits asks the places of some lots one by one, where the same way is known to be quickest at all.
+const VISITS_BY_ITSELF: u32 = 8;
+
 /// How much of what sets a way apart at a place is believed: the rest is what it is elsewhere. One figure of one visit may
 /// be of a cold cache, or of a view that was a little different.
 const BELIEF: f32 = 0.65;
@@ -94,23 +105,88 @@ const BELIEF: f32 = 0.65;
 impl<const WAYS: usize> Default for Choice<WAYS> {
     fn default() -> Self {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
-        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, usual: 0.0, lots: 0, by_place: false }
+        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, teaches: false, is_watched: false }
     }
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
-        self.by_place = false;
+        self.teaches = true;
         if self.is_beginning() {
             let place = self.lots as usize % (2 * WAYS);
             return if place < WAYS { place } else { 2 * WAYS - 1 - place };
         }
         self.meet(self.here);
         let kind = &mut self.kinds[self.here];
+        let quickest = kind.quickest();
+        if self.is_watched {
+            return quickest;
+        }
+        kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
+        (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0).unwrap_or(quickest)
+    }
+
+    /// The way for the next lot, and another one that it is to be traced by as well, if one is due, so that both can be
+    /// [compared](Self::compare).
+    pub fn next_pair(&mut self) -> (usize, Option<usize>) {
+        self.teaches = false;
+        if self.meet(self.here) {
+            let kind = &mut self.kinds[self.here];
+            kind.wait = std::array::from_fn(|way| kind.wait_of_duel(way));
+        }
+        let kind = &mut self.kinds[self.here];
         kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
         let quickest = kind.quickest();
-        (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0).unwrap_or(quickest)
+        (quickest, (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0))
+    }
+
+    /// Two ways in the order in which they are to trace the next lot: not that of the last time. (Who comes later finds in the caches
+    /// what the other one has fetched.)
+    pub fn in_turn(&self, [way, rival]: [usize; 2]) -> [usize; 2] {
+        let is_turned = self.kinds[self.here].taken[rival] % 2 == 1;
+        let [low, high] = [way.min(rival), way.max(rival)];
+        if is_turned { [high, low] } else { [low, high] }
+    }
+
+    /// Learns from what a lot cost by two ways, logarithms.
+    pub fn compare(&mut self, ways: [usize; 2], costs: [f32; 2]) {
+        let kind = &mut self.kinds[self.here];
+        for way in ways {
+            kind.taken[way] = kind.taken[way].saturating_add(1);
+        }
+        let [way, rival] = ways;
+        let duels = kind.taken[way].min(kind.taken[rival]);
+        let weight = WEIGHT_OF_DUEL.max(1.0 / duels as f32);
+        let gap = kind.cost[rival] - kind.cost[way];
+        kind.cost[rival] += weight * ((costs[1] - costs[0]).clamp(-SPIKE, SPIKE) - gap);
+        for way in ways {
+            kind.wait[way] = kind.wait_of_duel(way);
+        }
+    }
+
+    /// Whether a way is thought to be quickest for so many lots to come, with no other one to be tried meanwhile. Then they are
+    /// taken to be one.
+    pub fn settles_on(&mut self, way: usize, lots: usize) -> bool {
+        if self.is_beginning() {
+            return false;
+        }
+        self.meet(self.here);
+        let kind = &mut self.kinds[self.here];
+        let is_due = |other: usize| other != way && kind.wait[other] <= lots as f32;
+        if kind.quickest() != way || (0..WAYS).any(is_due) {
+            return false;
+        }
+        kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
+        self.teaches = true;
+        true
+    }
+
+    /// The same where the way is known to be quickest at the places of all of them, but for one in how many visits that asks
+    /// each place by itself.
+    pub fn settles_there(&mut self) -> bool {
+        self.teaches = false;
+        !self.is_beginning() && !self.dice().is_multiple_of(VISITS_BY_ITSELF)
     }
 
     /// Whether all ways are being tried for the first time.
@@ -127,8 +203,8 @@ impl<const WAYS: usize> Choice<WAYS> {
         if self.is_beginning() || dice.is_multiple_of(VISITS_AS_ELSEWHERE) {
             return self.next();
         }
-        self.by_place = true;
-        let kind = self.kind_at(least);
+        self.teaches = false;
+        let kind = Self::kind_at(least);
         self.meet(kind);
         let costs = expected(known, &self.kinds[kind].cost);
         let best = smallest(&costs);
@@ -150,25 +226,25 @@ impl<const WAYS: usize> Choice<WAYS> {
     }
 
     /// The kind of place where a lot costs so much.
-    fn kind_at(&self, cost: f32) -> usize {
-        // What is usual is in the middle of the middle kind.
-        let place = (cost - self.usual) / WIDTH + KINDS as f32 * 0.5;
+    fn kind_at(cost: f32) -> usize {
+        let place = (cost - FIRST_KIND) / WIDTH + 1.0;
         (place.max(0.0) as usize).min(KINDS - 1)
     }
 
-    /// In a kind of place that is new, begins with what the nearest known one has taught.
-    fn meet(&mut self, new: usize) {
-        if self.kinds[new].taken != [0; WAYS] {
-            return;
+    /// In a kind of place that is new, begins with what the nearest known one has taught, if any is. Says whether it has.
+    fn meet(&mut self, new: usize) -> bool {
+        let is_known = |kind: &usize| self.kinds[*kind].taken != [0; WAYS];
+        if is_known(&new) {
+            return false;
         }
-        let known = |&kind: &usize| self.kinds[kind].taken != [0; WAYS];
-        let Some(nearest) = (0..KINDS).filter(known).min_by_key(|kind| kind.abs_diff(new)) else {
-            return;
+        let Some(nearest) = (0..KINDS).filter(is_known).min_by_key(|kind| kind.abs_diff(new)) else {
+            return false;
         };
         let Kind { cost, .. } = self.kinds[nearest];
         let kind = &mut self.kinds[new];
-        *kind = Kind { cost, taken: [1; WAYS], wait: [0.0; WAYS] };
+        *kind = Kind { cost, taken: [2; WAYS], wait: [0.0; WAYS] };
         kind.wait = std::array::from_fn(|way| kind.wait_of(way));
+        true
     }
 
     /// The way that is thought to be quickest for the next lot.
@@ -181,7 +257,7 @@ impl<const WAYS: usize> Choice<WAYS> {
     pub fn pass(&mut self, cost: f32) {
         self.last = cost;
         if !self.is_beginning() {
-            self.here = self.kind_at(cost);
+            self.here = Self::kind_at(cost);
         }
     }
 
@@ -192,23 +268,25 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// Says what the lot cost for which `way` was taken. Gives the logarithm (base 2) of the nanoseconds a ray; nothing
     /// if there were no rays.
-    pub fn record(&mut self, way: usize, rays: u64, time: Duration) -> Option<f32> {
-        if rays == 0 {
-            return None;
-        }
-        // Clocks may stand still over a short lot.
-        let new = ((time.as_nanos() as f32).max(1.0) / rays as f32).log2();
-        if !self.by_place {
-            self.learn(way, new);
+    pub fn record(&mut self, way: usize, rays: usize, time: Duration) -> Option<f32> {
+        (rays > 0).then(|| {
+            let cost = cost_of(rays, time);
+            self.note(way, cost);
+            cost
+        })
+    }
+
+    /// The same, of its logarithm.
+    pub fn note(&mut self, way: usize, cost: f32) {
+        if self.teaches {
+            self.learn(way, cost);
         }
         self.lots = self.lots.saturating_add(1);
-        self.usual += WEIGHT_OF_USUAL.max(1.0 / self.lots as f32) * (new - self.usual);
-        self.last = new;
-        // All ways are tried in one kind of place, before others are told from it.
-        if !self.is_beginning() {
-            self.here = self.kind_at(new);
+        self.last = cost;
+        // Where ways are tried one after the other, all are in one kind of place before others are told from it.
+        if !self.teaches || !self.is_beginning() {
+            self.here = Self::kind_at(cost);
         }
-        Some(new)
     }
 
     /// Learns from what a lot cost.
@@ -241,6 +319,23 @@ impl<const WAYS: usize> Kind<WAYS> {
         let known = (self.taken[way] as f32 / KNOWN_WELL).min(1.0);
         (LEAST_WAIT + WAIT * slower * known).min(MOST_WAIT)
     }
+
+    /// Lots until a way is to be compared again with the quickest one.
+    fn wait_of_duel(&self, way: usize) -> f32 {
+        let slower = (2.0 * (self.cost[way] - self.cost[self.quickest()])).exp2() - 1.0;
+        // Each order of two once.
+        if self.taken[way] % 2 == 1 {
+            return 0.0;
+        }
+        let first = FIRST_WAIT_OF_DUEL * (self.taken[way] as f32).exp2() * (1.0 + slower);
+        (LEAST_WAIT_OF_DUEL + WAIT * slower).min(MOST_WAIT).min(first)
+    }
+}
+
+/// Logarithm (base 2) of the nanoseconds that each of some rays took, one at least.
+pub fn cost_of(rays: usize, time: Duration) -> f32 {
+    // Clocks may stand still over a short lot.
+    ((time.as_nanos() as f32).max(1.0) / rays as f32).log2()
 }
 
 /// What each way is expected to cost at a place where some of them, at least one, are known to, if they cost `elsewhere`,
@@ -261,153 +356,4 @@ fn smallest<const WAYS: usize>(costs: &[f32; WAYS]) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::places::Places;
-    use super::*;
-
-    /// Traces lots of 256 rays, `cost(lot, way)` giving the nanoseconds a ray; how often each way was
-    /// taken, and the time that all took beside the least that one way could.
-    fn run<const WAYS: usize>(
-        choice: &mut Choice<WAYS>,
-        lots: u32,
-        mut cost: impl FnMut(u32) -> [f64; WAYS],
-    ) -> ([u32; WAYS], f64) {
-        let (mut taken, mut total, mut each) = ([0; WAYS], 0.0, [0.0; WAYS]);
-        for lot in 0..lots {
-            let cost = cost(lot);
-            let way = choice.next();
-            taken[way] += 1;
-            total += cost[way];
-            (0..WAYS).for_each(|way| each[way] += cost[way]);
-            choice.record(way, 256, Duration::from_nanos((256.0 * cost[way]) as u64));
-        }
-        (taken, total / each.into_iter().fold(f64::INFINITY, f64::min))
-    }
-
-    #[test]
-    fn the_slower_way_costs_little_however_slow() {
-        for cost in [[30.0, 36.0], [36.0, 30.0], [30.0, 90.0], [300.0, 30.0], [30.0, 30.0]] {
-            let (taken, ratio) = run(&mut Choice::default(), 4000, |_| cost);
-            assert!(taken[0] > 0 && taken[1] > 0);
-            assert!(ratio < 1.03, "{cost:?}: {ratio}");
-        }
-        for cost in [[30.0, 36.0, 33.0], [36.0, 30.0, 300.0], [90.0, 60.0, 30.0]] {
-            let (taken, ratio) = run(&mut Choice::default(), 4000, |_| cost);
-            assert!(!taken.contains(&0));
-            assert!(ratio < 1.05, "{cost:?}: {ratio}");
-        }
-    }
-
-    #[test]
-    fn what_lots_hold_is_not_taken_for_the_way() {
-        // From lot to lot the work changes by four times; the second way is a sixth slower.
-        let (_, ratio) = run(&mut Choice::default(), 8000, |lot| {
-            let random = f64::from(lot.wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 24);
-            let work = (3.0 + 2.0 * random).exp2();
-            [work * 6.0, work * 7.0]
-        });
-        assert!(ratio < 1.04, "{ratio}");
-    }
-
-    #[test]
-    fn dear_places_may_have_a_way_of_their_own() {
-        // In every other run of 50 lots, packets' price is three times as high and a beam's eight.
-        let dear = |lot: u32| lot / 50 % 2 == 1;
-        let (_, ratio) =
-            run(&mut Choice::default(), 8000, |lot| if dear(lot) { [240.0, 150.0] } else { [30.0, 50.0] });
-        assert!(ratio < 0.96, "{ratio}: either way alone would take as long as 1");
-    }
-
-    #[test]
-    fn a_rise_at_the_start_is_not_taken_for_the_way() {
-        // Each lot is a half dearer than the one before, until all ways have been tried.
-        let (_, ratio) = run(&mut Choice::default(), 4000, |lot| {
-            let work = 1.5f64.powi(lot.min(12) as i32);
-            [work * 30.0, work * 60.0, work * 63.0]
-        });
-        assert!(ratio < 1.03, "{ratio}");
-    }
-
-    #[test]
-    fn a_change_is_noticed() {
-        let mut choice = Choice::default();
-        run(&mut choice, 500, |_| [30.0, 45.0]);
-        let (taken, _) = run(&mut choice, 500, |_| [60.0, 45.0]);
-        assert!(taken[1] > 400, "{taken:?}");
-    }
-
-    #[test]
-    fn a_spike_is_forgotten() {
-        let mut choice = Choice::default();
-        run(&mut choice, 100, |_| [30.0, 45.0]);
-        choice.record(0, 256, Duration::from_millis(100));
-        let (taken, _) = run(&mut choice, 100, |_| [30.0, 45.0]);
-        assert!(taken[0] > 60, "{taken:?}");
-    }
-
-    #[test]
-    fn places_have_ways_of_their_own() {
-        // Which of three ways is quickest hangs on the place, and on nothing that the lot before tells.
-        let quickest = |place: u32| (place.wrapping_mul(0x9e37_79b9) >> 16) as usize % 3;
-        let cost =
-            |place: u32, way: usize| if way == quickest(place) { 30.0 } else { 50.0 + 30.0 * way as f64 };
-        let (mut choice, places) = (Choice::<3>::default(), Places::<3>::new(400));
-        let mut frame = |_| {
-            let mut total = 0.0;
-            for place in 0..400 {
-                let costs = places.at(place).closest.expect("it is there");
-                let way = choice.next_at(&costs.known());
-                let cost = cost(place as u32, way);
-                total += cost;
-                let cost = choice.record(way, 256, Duration::from_nanos((256.0 * cost) as u64));
-                costs.record(way, cost.expect("there were rays"));
-            }
-            total / 400.0
-        };
-        let first: f64 = frame(0);
-        let last = (1..200).map(&mut frame).last().expect("there were frames");
-        let best_single = (0..3)
-            .map(|way| (0..400).map(|place| cost(place, way)).sum::<f64>() / 400.0)
-            .fold(f64::INFINITY, f64::min);
-        assert!(first > 45.0, "{first}: nothing tells beforehand");
-        // All of the gain is a quarter and more; what trying costs is left over.
-        assert!(last < 0.8 * best_single, "{last} beside {best_single}");
-    }
-
-    #[test]
-    fn what_is_slow_at_a_place_is_hardly_ever_tried_there() {
-        let mut choice = Choice::<2>::default();
-        run(&mut choice, 100, |_| [30.0, 240.0]);
-        let tried = (0..10_000).filter(|_| {
-            let way = choice.next_at(&[Some(5.0), Some(8.0)]);
-            choice.record(way, 256, Duration::from_nanos([256 * 32, 256 * 256][way]));
-            way == 1
-        });
-        let tried = tried.count();
-        assert!((1..40).contains(&tried), "{tried}");
-    }
-
-    #[test]
-    fn what_was_traced_some_other_way_says_where_the_next_lot_is() {
-        let mut choice = Choice::<2>::default();
-        // Every other run of 20 lots is dear, and there the second way is quicker.
-        run(&mut choice, 2000, |lot| if lot / 20 % 2 == 1 { [900.0, 300.0] } else { [8.0, 12.0] });
-        for _ in 0..3 {
-            choice.pass(300f32.log2());
-            assert_eq!(choice.quickest(), 1);
-            assert_eq!(choice.last(), 300f32.log2());
-            choice.pass(8f32.log2());
-            assert_eq!(choice.quickest(), 0);
-        }
-        let mut new = Choice::<2>::default();
-        new.pass(10.0);
-        assert!(new.is_beginning() && new.next() == 0, "and teaches nothing about ways");
-    }
-
-    #[test]
-    fn nothing_is_learnt_from_no_rays() {
-        let mut choice = Choice::<2>::default();
-        assert_eq!(choice.record(0, 0, Duration::from_secs(1)), None);
-        assert_eq!(choice.next(), 0);
-    }
-}
+mod tests;

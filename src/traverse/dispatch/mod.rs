@@ -9,7 +9,10 @@
 //!
 //! It is chosen twice. Four squares may go as one wide beam where squares go best as beams, or, for any hit, as lists of rays
 //! where they do not: which is better is learnt from what a *lot* of four has cost either way. If they do neither, each of
-//! them is chosen for by itself, as triangles as small as pixels want it.
+//! them is chosen for by itself, as triangles as small as pixels want it. Where lots go as lists, up to four lots may be one list.
+//!
+//! What a choice costs counts where rays take 10 ns. So where squares go best as beams, and nothing else is to be tried, a lot's
+//! squares are timed together.
 
 mod choice;
 mod places;
@@ -29,7 +32,7 @@ use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
 use super::stopwatch::Stopwatch;
 use super::tile::PACKETS;
-use choice::Choice;
+use choice::{Choice, cost_of};
 use places::Costs;
 
 /// The kernels that it chooses among for a square of sixteen packets.
@@ -47,6 +50,10 @@ const ANY_LOT_WAYS: [Kernel; 2] = [Kernel::Filter, Kernel::Tile];
 const WIDE: usize = 0;
 const LISTS: usize = 0;
 
+/// Packets of a lot, for any hit. More than that are a *field*, for which lists are chosen, or each lot by itself: the more rays,
+/// the longer lists.
+const LOT: usize = 4 * PACKETS;
+
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
 /// who uses both needs both in memory. On a power plant of which 16 % were in memory, packets alone read 28 %
 /// fewer blocks and were a fifth faster.
@@ -63,6 +70,7 @@ const LEAST_RAYS: usize = 64;
 pub struct Dispatch {
     lots: Choice<{ LOT_WAYS.len() }>,
     any_lots: Choice<{ ANY_LOT_WAYS.len() }>,
+    any_fields: Choice<{ ANY_LOT_WAYS.len() }>,
     closest: Choice<{ WAYS.len() }>,
     any: Choice<{ WAYS.len() }>,
     /// Logarithm of the least that lists have taken for a ray.
@@ -88,9 +96,13 @@ impl Dispatch {
         if !is_lot(accel, closest, rays) || !in_beams {
             return Self::squares(closest, accel, places, rays, active, hits);
         }
-        let taken = timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
+        let taken = duelled(accel, &LOT_WAYS, lots, count(active), |kernel, is_duel| match kernel {
             Kernel::WideTile => accel.intersect_tile(rays, active, hits),
-            _ => Self::squares(closest, accel, places, rays, active, hits),
+            _ => {
+                closest.is_watched = is_duel;
+                Self::squares(closest, accel, places, rays, active, hits);
+                closest.is_watched = false;
+            }
         });
         if let Some((WIDE, cost)) = taken {
             closest.pass(cost);
@@ -123,6 +135,62 @@ impl Dispatch {
         active: &[u32],
         occluded: &mut [u32],
     ) {
+        if rays.len() <= LOT {
+            return self.occluded_lot(accel, places, rays, active, occluded);
+        }
+        // Only where lots go as lists a longer list may be better.
+        let Self { any_fields, any_lots, any, .. } = self;
+        let in_lists = is_lot(accel, any, rays)
+            && any.quickest() != BEAM
+            && !any_lots.is_beginning()
+            && any_lots.quickest() == LISTS;
+        if !in_lists {
+            return self.occluded_lots(accel, places, rays, active, occluded);
+        }
+        let mut choice = *any_fields;
+        let taken = timed(accel, &ANY_LOT_WAYS, &mut choice, None, count(active), |kernel| match kernel {
+            Kernel::Filter => accel.occluded_lists(rays, active, occluded),
+            _ => self.occluded_lots(accel, places, rays, active, occluded),
+        });
+        self.any_fields = choice;
+        if let Some((LISTS, cost)) = taken {
+            self.passed_as_lists(cost);
+            self.any_lots.pass(cost);
+        }
+    }
+
+    /// Takes note of what a ray took where lists did, logarithm of nanoseconds.
+    fn passed_as_lists(&mut self, cost: f32) {
+        self.any.pass(cost);
+        self.least_by_lists = Some(self.least_by_lists.map_or(cost, |least| least.min(cost)));
+    }
+
+    /// The same, lot by lot.
+    fn occluded_lots(
+        &mut self,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        occluded: &mut [u32],
+    ) {
+        let mut places = places.chunks(LOT / PACKETS);
+        for ((rays, active), occluded) in
+            rays.chunks(LOT).zip(active.chunks(LOT)).zip(occluded.chunks_mut(LOT))
+        {
+            self.occluded_lot(accel, places.next().unwrap_or(&[]), rays, active, occluded);
+        }
+    }
+
+    /// The same for one lot.
+    fn occluded_lot(
+        &mut self,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        occluded: &mut [u32],
+    ) {
         let Self { any_lots, any, least_by_lists, .. } = self;
         // Where beams are quicker than packets, they are quicker than lists. And rays that run through little are not
         // worth a list's trouble, which costs something even where they meet nothing.
@@ -135,8 +203,7 @@ impl Dispatch {
             _ => Self::occluded_squares(any, accel, places, rays, active, occluded),
         });
         if let Some((LISTS, cost)) = taken {
-            any.pass(cost);
-            *least_by_lists = Some(least_by_lists.map_or(cost, |least| least.min(cost)));
+            self.passed_as_lists(cost);
         }
     }
 
@@ -183,16 +250,38 @@ impl Dispatch {
 fn by_squares<'a, A>(
     choice: &mut Choice<{ WAYS.len() }>,
     accel: &Accel,
-    places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>>,
+    places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>> + Clone,
     rays: &[RayPacket<16>],
     active: &[u32],
     answers: &mut [A],
     trace: impl Fn(Kernel, &[RayPacket<16>], &[u32], &mut [A]),
 ) {
+    let in_beams = is_lot(accel, choice, rays)
+        && count(active) >= LEAST_RAYS
+        && are_beams(choice, places.clone(), rays.len().div_ceil(PACKETS));
     let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
+    if in_beams {
+        let trace_all =
+            || squares.for_each(|((rays, active), answers)| trace(WAYS[BEAM], rays, active, answers));
+        recorded(accel, choice, BEAM, count(active), trace_all);
+        return;
+    }
     for (((rays, active), answers), place) in squares.zip(places.chain(std::iter::repeat(None))) {
         timed(accel, &WAYS, choice, place, count(active), |kernel| trace(kernel, rays, active, answers));
     }
+}
+
+/// Whether a lot's squares are all traced as beams, with nothing to be learnt of any by itself.
+fn are_beams<'a>(
+    choice: &mut Choice<{ WAYS.len() }>,
+    places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>> + Clone,
+    squares: usize,
+) -> bool {
+    if places.clone().flatten().next().is_none() {
+        return choice.settles_on(BEAM, squares);
+    }
+    let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
+    places.flatten().all(go_best) && choice.settles_there()
 }
 
 /// Whether packets are a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,
@@ -231,6 +320,37 @@ fn timed<const N: usize>(
     Some((way, cost))
 }
 
+/// The same for a lot, which two kernels trace now and then, to be compared. (`trace` is told whether they do.)
+#[inline(always)]
+fn duelled<const N: usize>(
+    accel: &Accel,
+    ways: &[Kernel; N],
+    choice: &mut Choice<N>,
+    rays: usize,
+    mut trace: impl FnMut(Kernel, bool),
+) -> Option<(usize, f32)> {
+    if rays < LEAST_RAYS {
+        trace(ways[choice.quickest()], false);
+        return None;
+    }
+    let (way, rival) = choice.next_pair();
+    let Some(rival) = rival else {
+        let cost = recorded(accel, choice, way, rays, || trace(ways[way], false))?;
+        return Some((way, cost));
+    };
+    let pair = choice.in_turn([way, rival]);
+    let mut costs = [0.0; 2];
+    for (way, cost) in pair.into_iter().zip(&mut costs) {
+        let start = Stopwatch::start(accel);
+        trace(ways[way], true);
+        *cost = cost_of(rays, start.elapsed(accel));
+    }
+    choice.compare(pair, costs);
+    let cost = if pair[0] == way { costs[0] } else { costs[1] };
+    choice.note(way, cost);
+    Some((way, cost))
+}
+
 /// Has a way trace so many rays, and takes note of how long that took.
 #[inline(always)]
 fn recorded<const N: usize>(
@@ -242,7 +362,7 @@ fn recorded<const N: usize>(
 ) -> Option<f32> {
     let start = Stopwatch::start(accel);
     trace();
-    choice.record(way, rays as u64, start.elapsed(accel))
+    choice.record(way, rays, start.elapsed(accel))
 }
 
 /// The lanes in which there are rays.

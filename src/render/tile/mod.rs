@@ -1,5 +1,9 @@
 //! Rendering one tile: its pixels in small blocks, a packet to each.
 
+mod calls;
+
+pub(super) use calls::Calls;
+
 use super::bounded::StandIn;
 use super::frame::TilePixels;
 use super::matt::{AddKey, Found, Shades};
@@ -7,11 +11,11 @@ use super::order::Tile;
 use super::sampling::subpixel;
 use super::shade::Shader;
 use super::stats::Tally;
-use crate::geometry::{Hit, Ray};
 use crate::morton;
 use crate::scene::{Look, Surface, View};
 use crate::simd::{Simd, Task};
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, PacketWidth, Place, Places, RayPacket, Stopwatch};
+use crate::traverse::{Accel, Dispatch, HitPacket, PacketWidth, Place, Places, RayPacket, Stopwatch};
+use std::ops::Range;
 use std::time::Instant;
 
 /// Side of the square of pixels that go through the stages together: what the tile kernel takes; enough
@@ -21,6 +25,12 @@ pub(super) const SQUARE: u32 = 16;
 
 /// Side of a lot of such squares, which wide beams take at once.
 const LOT: u32 = 2 * SQUARE;
+
+/// So many lots beside one another, and as many below, make a field, whose shadow rays go at once.
+const LOTS: u32 = 2;
+
+/// Lots in a field.
+const FIELD: usize = (LOTS * LOTS) as usize;
 
 /// Squares in a lot.
 const SQUARES: usize = ((LOT / SQUARE) * (LOT / SQUARE)) as usize;
@@ -32,102 +42,6 @@ pub(super) const fn squares(pixels: u32) -> usize {
 
 /// Pixels in a square.
 const BATCH: usize = (SQUARE * SQUARE) as usize;
-
-/// Answers, packet by packet, what was asked of their lanes at the places of their squares.
-type Call<const W: usize, A> = fn(&mut Dispatch, &Accel, &[Place<'_>], &[RayPacket<W>], &[u32], &mut [A]);
-
-/// How a square's packets are traced. What was learnt from the squares before is there for those who can
-/// use it.
-pub(super) struct Calls<const W: usize> {
-    /// Side of the square of pixels whose packets come at once: [`SQUARE`] or [`LOT`].
-    side: u32,
-    /// The closest hits of the lanes given with each packet.
-    intersect: Call<W, HitPacket<W>>,
-    /// Which of those lanes hit anything.
-    occluded: Call<W, u32>,
-}
-
-impl<const W: usize> Calls<W>
-where
-    RayPacket<W>: PacketWidth<W>,
-{
-    /// Packet by packet.
-    pub const PACKETS: Self = Self {
-        side: SQUARE,
-        intersect: |_, accel, _, rays, active, hits| accel.intersect_packets(rays, active, hits),
-        occluded: |_, accel, _, rays, active, occluded| accel.occluded_packets(rays, active, occluded),
-    };
-}
-
-impl Calls<1> {
-    /// All rays of a square in one stream.
-    pub const STREAM: Self = Self {
-        side: SQUARE,
-        intersect: |_, accel, _, rays, active, hits| {
-            intersect_each(accel, Kernel::Stream, rays, active, hits)
-        },
-        occluded: |_, accel, _, rays, active, found| {
-            occluded_each(accel, Kernel::Stream, rays, active, found)
-        },
-    };
-
-    /// All rays of a lot in lists.
-    pub const LISTS: Self = Self {
-        side: LOT,
-        intersect: |_, accel, _, rays, active, hits| {
-            intersect_each(accel, Kernel::Filter, rays, active, hits)
-        },
-        occluded: |_, accel, _, rays, active, found| {
-            occluded_each(accel, Kernel::Filter, rays, active, found)
-        },
-    };
-}
-
-/// Traces rays one by one, as the kernel sees it.
-fn intersect_each(
-    accel: &Accel,
-    kernel: Kernel,
-    rays: &[RayPacket<1>],
-    active: &[u32],
-    hits: &mut [HitPacket<1>],
-) {
-    let mut found = [Hit::MISS; SQUARES * BATCH];
-    let found = &mut found[..rays.len()];
-    accel.intersect_many(kernel, &unpacked(rays, active)[..rays.len()], found);
-    for (packet, hit) in hits.iter_mut().zip(found) {
-        *packet = HitPacket::of_hit(hit);
-    }
-}
-
-/// The same for any hit.
-fn occluded_each(accel: &Accel, kernel: Kernel, rays: &[RayPacket<1>], active: &[u32], occluded: &mut [u32]) {
-    let mut found = [false; SQUARES * BATCH];
-    let found = &mut found[..rays.len()];
-    accel.occluded_many(kernel, &unpacked(rays, active)[..rays.len()], found);
-    for (lanes, &found) in occluded.iter_mut().zip(&*found) {
-        *lanes = u32::from(found);
-    }
-}
-
-/// Rays one by one; those that do not count look for nothing.
-fn unpacked(rays: &[RayPacket<1>], active: &[u32]) -> [Ray; SQUARES * BATCH] {
-    let mut all = [RayPacket::<1>::empty().get(0); SQUARES * BATCH];
-    for ((ray, packet), &active) in all.iter_mut().zip(rays).zip(active) {
-        if active != 0 {
-            *ray = packet.get(0);
-        }
-    }
-    all
-}
-
-impl Calls<16> {
-    /// All rays of a square together where that is quicker.
-    pub const TILES: Self =
-        Self { side: SQUARE, intersect: Dispatch::intersect, occluded: Dispatch::occluded };
-
-    /// All rays of a lot, likewise.
-    pub const LOTS: Self = Self { side: LOT, ..Self::TILES };
-}
 
 /// All that a tile's rendering reads.
 pub(super) struct TileTask<'a, S, const W: usize> {
@@ -144,6 +58,16 @@ pub(super) struct TileTask<'a, S, const W: usize> {
     pub stand_in: Option<StandIn<'a>>,
 }
 
+/// What goes at once.
+struct Field<'a> {
+    /// The packets of each lot, one lot behind the other.
+    parts: &'a [Range<usize>],
+    /// The squares of each.
+    places: &'a [[Place<'a>; SQUARES]; FIELD],
+    /// Packets in all.
+    used: usize,
+}
+
 /// One packet's pixels.
 #[derive(Clone, Copy)]
 struct Block {
@@ -152,11 +76,12 @@ struct Block {
     y: u32,
 }
 
-/// What a worker keeps from tile to tile: room for a square, packet by packet, and its counts.
+/// What a worker keeps from tile to tile: room for what goes at once, packet by packet, and its counts.
 pub(super) struct Scratch<const W: usize> {
     blocks: Vec<Block>,
     /// A bit for each lane whose pixel is in the tile.
     active: Vec<u32>,
+    /// Camera rays of a square or a lot, and what they hit.
     rays: Vec<RayPacket<W>>,
     hits: Vec<HitPacket<W>>,
     /// What one packet after the other hit.
@@ -181,12 +106,13 @@ pub(super) struct Scratch<const W: usize> {
 impl<const W: usize> Scratch<W> {
     /// Empty, with what has been learnt before about kernels.
     pub fn new(dispatch: Dispatch) -> Self {
-        let count = SQUARES * BATCH / W;
+        let of_lot = SQUARES * BATCH / W;
+        let count = FIELD * of_lot;
         Self {
             blocks: vec![Block { x: 0, y: 0 }; count],
             active: vec![0; count],
-            rays: vec![RayPacket::empty(); count],
-            hits: vec![HitPacket::miss(); count],
+            rays: vec![RayPacket::empty(); of_lot],
+            hits: vec![HitPacket::miss(); of_lot],
             found: Found::nothing(),
             shades: vec![Shades::black(); count],
             lit: vec![0; count],
@@ -240,16 +166,16 @@ where
         let mut pixels = pixels;
         let tile = pixels.tile;
         let mut is_complete = true;
-        let side = self.calls.side as usize;
+        let side = (self.calls.lots * self.calls.side) as usize;
         for y in (0..tile.height).step_by(side) {
             for x in (0..tile.width).step_by(side) {
                 // A scene that is in memory in part gives its turns by squares.
                 let _session = self.accel.cached().map(|cached| cached.session());
                 let Some(stand_in) = &self.stand_in else {
-                    self.square(scratch, &mut pixels, (x, y));
+                    self.field(scratch, &mut pixels, (x, y));
                     continue;
                 };
-                if stand_in.cached.in_time(|| self.square(scratch, &mut pixels, (x, y))).is_none() {
+                if stand_in.cached.in_time(|| self.field(scratch, &mut pixels, (x, y))).is_none() {
                     is_complete = false;
                     stand_in.draw(&self.shader, scratch, &mut pixels, (x, y));
                 }
@@ -262,51 +188,63 @@ where
         is_complete
     }
 
-    /// Renders the square of a tile at a place in it, or the lot.
-    fn square(&self, scratch: &mut Scratch<W>, pixels: &mut TilePixels<'_>, (x, y): (u32, u32)) {
-        let used = scratch.cover(&pixels.tile, x, y, self.calls.side);
-        // Where squares of tiles do not lie on the grid of the picture, two may have one number.
-        let [column, row] = [pixels.tile.x + x, pixels.tile.y + y].map(|place| (place / SQUARE) as usize);
-        let places: [Place<'_>; SQUARES] = std::array::from_fn(|square| {
-            let (right, down) = (square % 2, square / 2);
-            self.places.at((row + down) * self.columns + column + right)
-        });
+    /// Renders what goes at once at a place in a tile: a square, a lot or a field.
+    fn field(&self, scratch: &mut Scratch<W>, pixels: &mut TilePixels<'_>, (x, y): (u32, u32)) {
+        let Calls { side, lots, .. } = self.calls;
+        let mut places = [[Place::NONE; SQUARES]; FIELD];
+        let mut parts = [const { 0..0 }; FIELD];
+        let mut used = 0;
+        for (lot, part) in (0..lots * lots).zip(&mut parts) {
+            let (right, down) = morton::place(lot);
+            let (x, y) = (x + side * right, y + side * down);
+            *part = used..scratch.cover(&pixels.tile, (x, y), side, used);
+            used = part.end;
+            // Where squares of tiles do not lie on the grid of the picture, two may have one number.
+            let [column, row] = [pixels.tile.x + x, pixels.tile.y + y].map(|place| (place / SQUARE) as usize);
+            places[lot as usize] = std::array::from_fn(|square| {
+                let (right, down) = (square % 2, square / 2);
+                self.places.at((row + down) * self.columns + column + right)
+            });
+        }
+        let field = Field { parts: &parts[..(lots * lots) as usize], places: &places, used };
         for sample in 0..self.samples {
-            self.sample(scratch, used, sample, &places, pixels);
+            self.sample(scratch, &field, sample, pixels);
         }
         self.write(scratch, used, pixels);
     }
 
-    /// Takes one sample of each pixel of a square: camera rays, shading, shadow rays.
-    fn sample(
-        &self,
-        scratch: &mut Scratch<W>,
-        used: usize,
-        sample: u32,
-        places: &[Place<'_>],
-        pixels: &mut TilePixels<'_>,
-    ) {
-        let start = Stopwatch::start(self.accel);
-        let active = &scratch.active[..used];
-        self.make_rays(&scratch.blocks[..used], &mut scratch.rays, &pixels.tile, subpixel(sample));
-        let (rays, hits) = (&scratch.rays[..used], &mut scratch.hits[..used]);
-        (self.calls.intersect)(&mut scratch.dispatch, self.accel, places, rays, active, hits);
-        scratch.camera.rays += count(active);
-        scratch.camera.time += start.elapsed(self.accel);
+    /// Takes one sample of each pixel: camera rays and shading, lot by lot, and shadow rays.
+    fn sample(&self, scratch: &mut Scratch<W>, field: &Field<'_>, sample: u32, pixels: &mut TilePixels<'_>) {
+        for (part, places) in field.parts.iter().zip(field.places) {
+            let start = Stopwatch::start(self.accel);
+            let active = &scratch.active[part.clone()];
+            self.make_rays(&scratch.blocks[part.clone()], &mut scratch.rays, &pixels.tile, subpixel(sample));
+            let (rays, hits) = (&scratch.rays[..part.len()], &mut scratch.hits[..part.len()]);
+            (self.calls.intersect)(&mut scratch.dispatch, self.accel, places, rays, active, hits);
+            scratch.camera.rays += count(active);
+            scratch.camera.time += start.elapsed(self.accel);
 
-        let surfaces = self.shader.reader();
-        for packet in 0..used {
-            self.shade(scratch, &surfaces, packet, sample == 0, pixels);
+            let surfaces = self.shader.reader();
+            for packet in 0..part.len() {
+                self.shade(scratch, &surfaces, (packet, part.start + packet), sample == 0, pixels);
+            }
         }
-        drop(surfaces);
 
-        let start = Stopwatch::start(self.accel);
-        let lit = &scratch.lit[..used];
-        let (rays, occluded) = (&scratch.shadows[..used], &mut scratch.occluded[..used]);
-        (self.calls.occluded)(&mut scratch.dispatch, self.accel, places, rays, lit, occluded);
-        self.accel.chosen().run(AddKey { shades: &mut scratch.shades[..used], lit, occluded });
-        scratch.shadow.rays += count(lit);
-        scratch.shadow.time += start.elapsed(self.accel);
+        // At the edge of a tile lots are smaller, and a field is none.
+        let all = 0..field.used;
+        let is_whole = all.len() == field.parts.len() * SQUARES * BATCH / W;
+        let parts = if is_whole { std::slice::from_ref(&all) } else { field.parts };
+        let mut places = field.places.as_flattened();
+        for part in parts {
+            let start = Stopwatch::start(self.accel);
+            let lit = &scratch.lit[part.clone()];
+            let (rays, occluded) = (&scratch.shadows[part.clone()], &mut scratch.occluded[part.clone()]);
+            (self.calls.occluded)(&mut scratch.dispatch, self.accel, places, rays, lit, occluded);
+            self.accel.chosen().run(AddKey { shades: &mut scratch.shades[part.clone()], lit, occluded });
+            scratch.shadow.rays += count(lit);
+            scratch.shadow.time += start.elapsed(self.accel);
+            places = places.get(SQUARES..).unwrap_or_default();
+        }
     }
 
     /// Makes the rays through a point of each pixel.
@@ -314,18 +252,18 @@ where
         self.accel.chosen().run(CameraRays { view: &self.view, blocks, rays, tile, offset });
     }
 
-    /// Shades a packet's hits and makes its shadow rays. The first sample also fills the depth and
+    /// Shades a packet's hits, by its numbers in the lot and at all, and makes its shadow rays. The first sample also fills the depth and
     /// normal pictures.
     fn shade(
         &self,
         scratch: &mut Scratch<W>,
         surfaces: &impl Look,
-        packet: usize,
+        (of_lot, packet): (usize, usize),
         first: bool,
         pixels: &mut TilePixels<'_>,
     ) {
         let (block, shades) = (scratch.blocks[packet], &mut scratch.shades[packet]);
-        let (rays, hits, active) = (&scratch.rays[packet], &scratch.hits[packet], scratch.active[packet]);
+        let (rays, hits, active) = (&scratch.rays[of_lot], &scratch.hits[of_lot], scratch.active[packet]);
         let out = (&mut scratch.found, &mut *shades, &mut scratch.shadows[packet]);
         self.shader.shade(self.accel.chosen(), surfaces, (rays, hits, active), out);
         scratch.lit[packet] = shades.lit;
@@ -382,11 +320,11 @@ impl<const W: usize> Task for CameraRays<'_, W> {
 }
 
 impl<const W: usize> Scratch<W> {
-    /// Lays blocks over the square of a tile at (`x`, `y`), and says how many it takes. They come in Morton order, four
-    /// by four pixels at a time, so that each four such quarters and each sixteen are squares, too.
-    fn cover(&mut self, tile: &Tile, x: u32, y: u32, side: u32) -> usize {
+    /// Lays blocks over the square of a tile at (`x`, `y`), behind so many others, and says how many there are then. They come in Morton
+    /// order, four by four pixels at a time, so that each four such quarters and each sixteen are squares, too.
+    fn cover(&mut self, tile: &Tile, (x, y): (u32, u32), side: u32, before: usize) -> usize {
         let (width, height) = block_size(W);
-        let mut used = 0;
+        let mut used = before;
         for cell in 0..(side / CELL) * (side / CELL) {
             let (right, down) = morton::place(cell);
             let (left, top) = (x + CELL * right, y + CELL * down);
@@ -429,7 +367,7 @@ mod tests {
         let mut scratch = Scratch::<W>::new(Dispatch::default());
         for y in (0..tile.height).step_by(side as usize) {
             for x in (0..tile.width).step_by(side as usize) {
-                let used = scratch.cover(&tile, x, y, side);
+                let used = scratch.cover(&tile, (x, y), side, 0);
                 for (block, &active) in scratch.blocks[..used].iter().zip(&scratch.active) {
                     for lane in lanes(active) {
                         let (x, y) = place_of::<W>(block.x, block.y, lane);
