@@ -193,20 +193,25 @@ where
         let Calls { side, lots, .. } = self.calls;
         let mut places = [[Place::NONE; SQUARES]; FIELD];
         let mut parts = [const { 0..0 }; FIELD];
-        let mut used = 0;
-        for (lot, part) in (0..lots * lots).zip(&mut parts) {
+        let (mut used, mut inside) = (0, 0);
+        for lot in 0..lots * lots {
             let (right, down) = morton::place(lot);
             let (x, y) = (x + side * right, y + side * down);
-            *part = used..scratch.cover(&pixels.tile, (x, y), side, used);
-            used = part.end;
+            if x >= pixels.tile.width || y >= pixels.tile.height {
+                continue;
+            }
+            let begin = used;
+            used = scratch.cover(&pixels.tile, (x, y), side, begin);
+            parts[inside] = begin..used;
             // Where squares of tiles do not lie on the grid of the picture, two may have one number.
             let [column, row] = [pixels.tile.x + x, pixels.tile.y + y].map(|place| (place / SQUARE) as usize);
-            places[lot as usize] = std::array::from_fn(|square| {
+            places[inside] = std::array::from_fn(|square| {
                 let (right, down) = (square % 2, square / 2);
                 self.places.at((row + down) * self.columns + column + right)
             });
+            inside += 1;
         }
-        let field = Field { parts: &parts[..(lots * lots) as usize], places: &places, used };
+        let field = Field { parts: &parts[..inside], places: &places, used };
         for sample in 0..self.samples {
             self.sample(scratch, &field, sample, pixels);
         }

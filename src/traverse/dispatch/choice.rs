@@ -5,11 +5,14 @@
 //! what it was given then looks slow, and not what happened to be in front of it.
 //!
 //! Which way is quickest changes within a picture, and goes with how dear the lots are: where one costs
-//! many times the usual, triangles are smaller than what rays share. So there are averages for each of
-//! some [`KINDS`] of place, told apart by what the lot before cost beside the usual.
+//! many times what others do, triangles are smaller than what rays share. So there are averages for each of
+//! some [`KINDS`] of place, told apart by what the lot before cost. (Beside what is usual, kinds once were told apart. But in
+//! pictures of much sky and a little of something dear that changes by a factor of twenty, and what was known of kinds with it:
+//! the power plant from outside took 1.10 times as long as by the best way, and since then 1.02.)
 //!
 //! A study replayed the times of all lots of thirteen views' camera and shadow rays by three ways each, with
-//! noise: this took 0.9 % longer than the best single way over three pictures on average (2.6 % over the first),
+//! noise, when kinds still were told apart like that: this took 0.9 % longer than the best single way over three pictures on average
+//! (2.6 % over the first),
 //! from 10 % less (a kitchen, where no way is best everywhere) to 7 % more (shadow rays among triangles smaller
 //! than pixels). Averages of plain times took up to 27 % longer, relative ones that know no kinds up to 26 %,
 //! and what believed the first two lots of each way once took 76 % longer for a whole picture.
@@ -33,11 +36,8 @@ pub struct Choice<const WAYS: usize> {
     last: f32,
     /// Lots so far.
     lots: u32,
-    /// Whether what the next lot costs by itself teaches anything: not if its way was chosen by what is known of its place, or if ways
-    /// are compared in duels.
-    teaches: bool,
-    /// Whether somebody compares what is chosen here with something else, so that no slower way is to be tried.
-    pub is_watched: bool,
+    /// Whether the next lot's way was chosen by what is known of its place.
+    by_place: bool,
 }
 
 /// What is known of one kind of place.
@@ -61,10 +61,9 @@ const FIRST_KIND: f32 = 2.6;
 /// grow dearer meanwhile are not taken for a way that is slow.
 const FIRST: u32 = 2;
 
-/// The least that a new figure counts, how much one of a trial does, and one of a duel.
+/// The least that a new figure counts, and how much one of a trial does.
 const WEIGHT: f32 = 0.07;
 const WEIGHT_OF_TRIAL: f32 = 0.15;
-const WEIGHT_OF_DUEL: f32 = 0.12;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -81,10 +80,6 @@ const MOST_WAIT: f32 = 800.0;
 
 /// The number of lots after a trial that did better than the quickest way is known to.
 const WAIT_AFTER_SURPRISE: f32 = 4.0;
-
-/// The least number of lots between two duels with a slower way, and the number until the first ones, doubled each time.
-const LEAST_WAIT_OF_DUEL: f32 = 100.0;
-const FIRST_WAIT_OF_DUEL: f32 = 2.0;
 
 /// At a place that is known: one in how many visits tries a way again that is as quick as the quickest, one that was never
 /// tried there, and how many more visits it is for each time that a way is slower, squared.
@@ -105,64 +100,23 @@ const BELIEF: f32 = 0.65;
 impl<const WAYS: usize> Default for Choice<WAYS> {
     fn default() -> Self {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
-        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, teaches: false, is_watched: false }
+        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, by_place: false }
     }
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
-        self.teaches = true;
+        self.by_place = false;
         if self.is_beginning() {
             let place = self.lots as usize % (2 * WAYS);
             return if place < WAYS { place } else { 2 * WAYS - 1 - place };
         }
         self.meet(self.here);
         let kind = &mut self.kinds[self.here];
-        let quickest = kind.quickest();
-        if self.is_watched {
-            return quickest;
-        }
         kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
+        let quickest = kind.quickest();
         (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0).unwrap_or(quickest)
-    }
-
-    /// The way for the next lot, and another one that it is to be traced by as well, if one is due, so that both can be
-    /// [compared](Self::compare).
-    pub fn next_pair(&mut self) -> (usize, Option<usize>) {
-        self.teaches = false;
-        if self.meet(self.here) {
-            let kind = &mut self.kinds[self.here];
-            kind.wait = std::array::from_fn(|way| kind.wait_of_duel(way));
-        }
-        let kind = &mut self.kinds[self.here];
-        kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
-        let quickest = kind.quickest();
-        (quickest, (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0))
-    }
-
-    /// Two ways in the order in which they are to trace the next lot: not that of the last time. (Who comes later finds in the caches
-    /// what the other one has fetched.)
-    pub fn in_turn(&self, [way, rival]: [usize; 2]) -> [usize; 2] {
-        let is_turned = self.kinds[self.here].taken[rival] % 2 == 1;
-        let [low, high] = [way.min(rival), way.max(rival)];
-        if is_turned { [high, low] } else { [low, high] }
-    }
-
-    /// Learns from what a lot cost by two ways, logarithms.
-    pub fn compare(&mut self, ways: [usize; 2], costs: [f32; 2]) {
-        let kind = &mut self.kinds[self.here];
-        for way in ways {
-            kind.taken[way] = kind.taken[way].saturating_add(1);
-        }
-        let [way, rival] = ways;
-        let duels = kind.taken[way].min(kind.taken[rival]);
-        let weight = WEIGHT_OF_DUEL.max(1.0 / duels as f32);
-        let gap = kind.cost[rival] - kind.cost[way];
-        kind.cost[rival] += weight * ((costs[1] - costs[0]).clamp(-SPIKE, SPIKE) - gap);
-        for way in ways {
-            kind.wait[way] = kind.wait_of_duel(way);
-        }
     }
 
     /// Whether a way is thought to be quickest for so many lots to come, with no other one to be tried meanwhile. Then they are
@@ -178,14 +132,14 @@ impl<const WAYS: usize> Choice<WAYS> {
             return false;
         }
         kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
-        self.teaches = true;
+        self.by_place = false;
         true
     }
 
     /// The same where the way is known to be quickest at the places of all of them, but for one in how many visits that asks
     /// each place by itself.
     pub fn settles_there(&mut self) -> bool {
-        self.teaches = false;
+        self.by_place = true;
         !self.is_beginning() && !self.dice().is_multiple_of(VISITS_BY_ITSELF)
     }
 
@@ -203,7 +157,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         if self.is_beginning() || dice.is_multiple_of(VISITS_AS_ELSEWHERE) {
             return self.next();
         }
-        self.teaches = false;
+        self.by_place = true;
         let kind = Self::kind_at(least);
         self.meet(kind);
         let costs = expected(known, &self.kinds[kind].cost);
@@ -231,25 +185,27 @@ impl<const WAYS: usize> Choice<WAYS> {
         (place.max(0.0) as usize).min(KINDS - 1)
     }
 
-    /// In a kind of place that is new, begins with what the nearest known one has taught, if any is. Says whether it has.
-    fn meet(&mut self, new: usize) -> bool {
+    /// The kind of place most like a given one of those that something is known of: that one itself if it can be.
+    fn nearest_known(&self, kind: usize) -> Option<usize> {
         let is_known = |kind: &usize| self.kinds[*kind].taken != [0; WAYS];
-        if is_known(&new) {
-            return false;
+        if is_known(&kind) {
+            return Some(kind);
         }
-        let Some(nearest) = (0..KINDS).filter(is_known).min_by_key(|kind| kind.abs_diff(new)) else {
-            return false;
-        };
-        let Kind { cost, .. } = self.kinds[nearest];
+        (0..KINDS).filter(is_known).min_by_key(|known| known.abs_diff(kind))
+    }
+
+    /// In a kind of place that is new, begins with what the nearest known one has taught, if any is.
+    fn meet(&mut self, new: usize) {
+        let Some(nearest) = self.nearest_known(new).filter(|&nearest| nearest != new) else { return };
+        let Kind { cost, taken, .. } = self.kinds[nearest];
         let kind = &mut self.kinds[new];
-        *kind = Kind { cost, taken: [2; WAYS], wait: [0.0; WAYS] };
+        *kind = Kind { cost, taken: taken.map(|taken| taken.min(2 * FIRST)), wait: [0.0; WAYS] };
         kind.wait = std::array::from_fn(|way| kind.wait_of(way));
-        true
     }
 
     /// The way that is thought to be quickest for the next lot.
     pub fn quickest(&self) -> usize {
-        self.kinds[self.here].quickest()
+        self.kinds[self.nearest_known(self.here).unwrap_or(self.here)].quickest()
     }
 
     /// Says what a lot's rays took, logarithm of nanoseconds each, that were traced some other way: the next lot is thought to
@@ -269,24 +225,23 @@ impl<const WAYS: usize> Choice<WAYS> {
     /// Says what the lot cost for which `way` was taken. Gives the logarithm (base 2) of the nanoseconds a ray; nothing
     /// if there were no rays.
     pub fn record(&mut self, way: usize, rays: usize, time: Duration) -> Option<f32> {
-        (rays > 0).then(|| {
-            let cost = cost_of(rays, time);
-            self.note(way, cost);
-            cost
-        })
-    }
-
-    /// The same, of its logarithm.
-    pub fn note(&mut self, way: usize, cost: f32) {
-        if self.teaches {
-            self.learn(way, cost);
+        if rays == 0 {
+            return None;
+        }
+        // Clocks may stand still over a short lot.
+        let new = ((time.as_nanos() as f32).max(1.0) / rays as f32).log2();
+        if !self.by_place {
+            self.learn(way, new);
         }
         self.lots = self.lots.saturating_add(1);
-        self.last = cost;
-        // Where ways are tried one after the other, all are in one kind of place before others are told from it.
-        if !self.teaches || !self.is_beginning() {
-            self.here = Self::kind_at(cost);
+        self.last = new;
+        // All ways are tried in one kind of place, before others are told from it. And which kind it is, only what the quickest way
+        // takes tells: what is tried may be many times slower.
+        let is_trial = !self.by_place && way != self.kinds[self.here].quickest();
+        if !is_trial && !self.is_beginning() {
+            self.here = Self::kind_at(new);
         }
+        Some(new)
     }
 
     /// Learns from what a lot cost.
@@ -319,23 +274,6 @@ impl<const WAYS: usize> Kind<WAYS> {
         let known = (self.taken[way] as f32 / KNOWN_WELL).min(1.0);
         (LEAST_WAIT + WAIT * slower * known).min(MOST_WAIT)
     }
-
-    /// Lots until a way is to be compared again with the quickest one.
-    fn wait_of_duel(&self, way: usize) -> f32 {
-        let slower = (2.0 * (self.cost[way] - self.cost[self.quickest()])).exp2() - 1.0;
-        // Each order of two once.
-        if self.taken[way] % 2 == 1 {
-            return 0.0;
-        }
-        let first = FIRST_WAIT_OF_DUEL * (self.taken[way] as f32).exp2() * (1.0 + slower);
-        (LEAST_WAIT_OF_DUEL + WAIT * slower).min(MOST_WAIT).min(first)
-    }
-}
-
-/// Logarithm (base 2) of the nanoseconds that each of some rays took, one at least.
-pub fn cost_of(rays: usize, time: Duration) -> f32 {
-    // Clocks may stand still over a short lot.
-    ((time.as_nanos() as f32).max(1.0) / rays as f32).log2()
 }
 
 /// What each way is expected to cost at a place where some of them, at least one, are known to, if they cost `elsewhere`,

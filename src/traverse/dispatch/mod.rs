@@ -32,7 +32,7 @@ use super::kernel::Kernel;
 use super::lanes::{HitPacket, RayPacket};
 use super::stopwatch::Stopwatch;
 use super::tile::PACKETS;
-use choice::{Choice, cost_of};
+use choice::Choice;
 use places::Costs;
 
 /// The kernels that it chooses among for a square of sixteen packets.
@@ -96,13 +96,9 @@ impl Dispatch {
         if !is_lot(accel, closest, rays) || !in_beams {
             return Self::squares(closest, accel, places, rays, active, hits);
         }
-        let taken = duelled(accel, &LOT_WAYS, lots, count(active), |kernel, is_duel| match kernel {
+        let taken = timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
             Kernel::WideTile => accel.intersect_tile(rays, active, hits),
-            _ => {
-                closest.is_watched = is_duel;
-                Self::squares(closest, accel, places, rays, active, hits);
-                closest.is_watched = false;
-            }
+            _ => Self::squares(closest, accel, places, rays, active, hits),
         });
         if let Some((WIDE, cost)) = taken {
             closest.pass(cost);
@@ -140,11 +136,7 @@ impl Dispatch {
         }
         // Only where lots go as lists a longer list may be better.
         let Self { any_fields, any_lots, any, .. } = self;
-        let in_lists = is_lot(accel, any, rays)
-            && any.quickest() != BEAM
-            && !any_lots.is_beginning()
-            && any_lots.quickest() == LISTS;
-        if !in_lists {
+        if !is_lot(accel, any, rays) || any_lots.is_beginning() || any_lots.quickest() != LISTS {
             return self.occluded_lots(accel, places, rays, active, occluded);
         }
         let mut choice = *any_fields;
@@ -192,11 +184,13 @@ impl Dispatch {
         occluded: &mut [u32],
     ) {
         let Self { any_lots, any, least_by_lists, .. } = self;
-        // Where beams are quicker than packets, they are quicker than lists. And rays that run through little are not
-        // worth a list's trouble, which costs something even where they meet nothing.
-        let is_cheap = any_lots.quickest() != LISTS && least_by_lists.is_some_and(|least| any.last() < least);
-        if !is_lot(accel, any, rays) || any.quickest() == BEAM || is_cheap {
-            return Self::occluded_squares(any, accel, places, rays, active, occluded);
+        // Where lists have turned out to be slower, they are tried again where beams are not the quickest, and rays do not run
+        // through little: these are not worth a list's trouble, which costs something even where they meet nothing.
+        let were_slower = !any_lots.is_beginning() && any_lots.quickest() != LISTS;
+        let is_cheap = least_by_lists.is_some_and(|least| any.last() < least);
+        if !is_lot(accel, any, rays) || were_slower && (any.quickest() == BEAM || is_cheap) {
+            Self::occluded_squares(any, accel, places, rays, active, occluded);
+            return any_lots.pass(any.last());
         }
         let taken = timed(accel, &ANY_LOT_WAYS, any_lots, None, count(active), |kernel| match kernel {
             Kernel::Filter => accel.occluded_lists(rays, active, occluded),
@@ -320,37 +314,6 @@ fn timed<const N: usize>(
     Some((way, cost))
 }
 
-/// The same for a lot, which two kernels trace now and then, to be compared. (`trace` is told whether they do.)
-#[inline(always)]
-fn duelled<const N: usize>(
-    accel: &Accel,
-    ways: &[Kernel; N],
-    choice: &mut Choice<N>,
-    rays: usize,
-    mut trace: impl FnMut(Kernel, bool),
-) -> Option<(usize, f32)> {
-    if rays < LEAST_RAYS {
-        trace(ways[choice.quickest()], false);
-        return None;
-    }
-    let (way, rival) = choice.next_pair();
-    let Some(rival) = rival else {
-        let cost = recorded(accel, choice, way, rays, || trace(ways[way], false))?;
-        return Some((way, cost));
-    };
-    let pair = choice.in_turn([way, rival]);
-    let mut costs = [0.0; 2];
-    for (way, cost) in pair.into_iter().zip(&mut costs) {
-        let start = Stopwatch::start(accel);
-        trace(ways[way], true);
-        *cost = cost_of(rays, start.elapsed(accel));
-    }
-    choice.compare(pair, costs);
-    let cost = if pair[0] == way { costs[0] } else { costs[1] };
-    choice.note(way, cost);
-    Some((way, cost))
-}
-
 /// Has a way trace so many rays, and takes note of how long that took.
 #[inline(always)]
 fn recorded<const N: usize>(
@@ -389,12 +352,12 @@ mod tests {
             RayPacket::of_slice(&std::array::from_fn::<_, 16, _>(ray))
         };
         let mut dispatch = Dispatch::default();
-        let places = Places::new(4);
+        let places = Places::new(16);
         for lot in 0..60 {
-            let count = [64, 64, 16, 37, 64, 1][lot % 6];
+            let count = [64, 256, 16, 37, 150, 1][lot % 6];
             let rays: Vec<RayPacket<16>> = (0..count).map(|i| packet(lot, i)).collect();
             let active: Vec<u32> = (0..count).map(|i| 0xffff >> (i % 5)).collect();
-            let at: Vec<Place<'_>> = (0..lot % 5).map(|square| places.at(square)).collect();
+            let at: Vec<Place<'_>> = (0..lot % 17).map(|square| places.at(square)).collect();
             let (mut hits, mut occluded) = (vec![HitPacket::miss(); count], vec![0; count]);
             dispatch.intersect(&accel, &at, &rays, &active, &mut hits);
             dispatch.occluded(&accel, &at, &rays, &active, &mut occluded);

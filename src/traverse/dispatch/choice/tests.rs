@@ -75,6 +75,14 @@ fn a_change_is_noticed() {
 }
 
 #[test]
+fn a_kind_of_place_that_is_new_is_taken_to_be_like_the_nearest() {
+    let mut choice = Choice::<2>::default();
+    run(&mut choice, 200, |_| [300.0, 200.0]);
+    choice.pass(700f32.log2());
+    assert_eq!(choice.quickest(), 1);
+}
+
+#[test]
 fn a_spike_is_forgotten() {
     let mut choice = Choice::default();
     run(&mut choice, 100, |_| [30.0, 45.0]);
