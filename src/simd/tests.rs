@@ -183,7 +183,7 @@ fn check_sixteen<L: Sixteen>() {
     let half: &[f32; 8] = scrambled[2][3..].first_chunk().expect("there are as many");
     assert_eq!(L::of_half(L::Half::load(half)).store()[..8], half[..]);
     let side_by_side = L::side_by_side([1, 0, 3, 2].map(|i| &fours[i])).store();
-    assert_eq!(side_by_side, std::array::from_fn(|lane| fours[lane / 4 ^ 1][lane % 4]));
+    assert_eq!(side_by_side, std::array::from_fn(|lane| fours[(lane / 4) ^ 1][lane % 4]));
     let eight = [70, -3, 5, 9, 11, 2, 0, 40];
     let four = eight.first_chunk().expect("eight are more");
     assert_eq!(L::ids_store(L::ids_of_four(four)), std::array::from_fn(|lane| eight[lane % 4]));

@@ -36,8 +36,10 @@ pub struct Choice<const WAYS: usize> {
     last: f32,
     /// Lots so far.
     lots: u32,
-    /// Whether the next lot's way was chosen by what is known of its place.
+    /// Whether the next lot's way was chosen by what is known of its place, and whether it is tried though another one is thought to be
+    /// quicker.
     by_place: bool,
+    is_trial: bool,
 }
 
 /// What is known of one kind of place.
@@ -100,14 +102,14 @@ const BELIEF: f32 = 0.65;
 impl<const WAYS: usize> Default for Choice<WAYS> {
     fn default() -> Self {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
-        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, by_place: false }
+        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, by_place: false, is_trial: false }
     }
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
-        self.by_place = false;
+        (self.by_place, self.is_trial) = (false, true);
         if self.is_beginning() {
             let place = self.lots as usize % (2 * WAYS);
             return if place < WAYS { place } else { 2 * WAYS - 1 - place };
@@ -116,7 +118,9 @@ impl<const WAYS: usize> Choice<WAYS> {
         let kind = &mut self.kinds[self.here];
         kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
         let quickest = kind.quickest();
-        (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0).unwrap_or(quickest)
+        let due = (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0);
+        self.is_trial = due.is_some();
+        due.unwrap_or(quickest)
     }
 
     /// Whether a way is thought to be quickest for so many lots to come, with no other one to be tried meanwhile. Then they are
@@ -132,14 +136,14 @@ impl<const WAYS: usize> Choice<WAYS> {
             return false;
         }
         kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
-        self.by_place = false;
+        (self.by_place, self.is_trial) = (false, false);
         true
     }
 
     /// The same where the way is known to be quickest at the places of all of them, but for one in how many visits that asks
     /// each place by itself.
     pub fn settles_there(&mut self) -> bool {
-        self.by_place = true;
+        (self.by_place, self.is_trial) = (true, false);
         !self.is_beginning() && !self.dice().is_multiple_of(VISITS_BY_ITSELF)
     }
 
@@ -157,7 +161,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         if self.is_beginning() || dice.is_multiple_of(VISITS_AS_ELSEWHERE) {
             return self.next();
         }
-        self.by_place = true;
+        (self.by_place, self.is_trial) = (true, false);
         let kind = Self::kind_at(least);
         self.meet(kind);
         let costs = expected(known, &self.kinds[kind].cost);
@@ -235,10 +239,9 @@ impl<const WAYS: usize> Choice<WAYS> {
         }
         self.lots = self.lots.saturating_add(1);
         self.last = new;
-        // All ways are tried in one kind of place, before others are told from it. And which kind it is, only what the quickest way
-        // takes tells: what is tried may be many times slower.
-        let is_trial = !self.by_place && way != self.kinds[self.here].quickest();
-        if !is_trial && !self.is_beginning() {
+        // All ways are tried in one kind of place at first, before others are told from it. And which kind it is, only what the
+        // quickest way takes tells: what is tried may be many times slower.
+        if !self.is_trial && !self.is_beginning() {
             self.here = Self::kind_at(new);
         }
         Some(new)
