@@ -8,7 +8,7 @@
 //! many times what others do, triangles are smaller than what rays share. So there are averages for each of
 //! some [`KINDS`] of place, told apart by what the lot before cost. (Beside what is usual, kinds once were told apart. But in
 //! pictures of much sky and a little of something dear that changes by a factor of twenty, and what was known of kinds with it:
-//! the power plant from outside took 1.10 times as long as by the best way, and since then 1.02.)
+//! the power plant from outside took 1.09 to 1.11 times as long as by the best way, and since then 1.02 to 1.05.)
 //!
 //! A study replayed the times of all lots of thirteen views' camera and shadow rays by three ways each, with
 //! noise, when kinds still were told apart like that: this took 0.9 % longer than the best single way over three pictures on average

@@ -136,7 +136,11 @@ impl Dispatch {
         }
         // Only where lots go as lists a longer list may be better.
         let Self { any_fields, any_lots, any, .. } = self;
-        if !is_lot(accel, any, rays) || any_lots.is_beginning() || any_lots.quickest() != LISTS {
+        let in_lists = is_lot(accel, any, rays)
+            && any.quickest() != BEAM
+            && !any_lots.is_beginning()
+            && any_lots.quickest() == LISTS;
+        if !in_lists {
             return self.occluded_lots(accel, places, rays, active, occluded);
         }
         let mut choice = *any_fields;
@@ -184,11 +188,12 @@ impl Dispatch {
         occluded: &mut [u32],
     ) {
         let Self { any_lots, any, least_by_lists, .. } = self;
-        // Where lists have turned out to be slower, they are tried again where beams are not the quickest, and rays do not run
-        // through little: these are not worth a list's trouble, which costs something even where they meet nothing.
-        let were_slower = !any_lots.is_beginning() && any_lots.quickest() != LISTS;
-        let is_cheap = least_by_lists.is_some_and(|least| any.last() < least);
-        if !is_lot(accel, any, rays) || were_slower && (any.quickest() == BEAM || is_cheap) {
+        // Where beams are quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
+        // through little are not worth a list's trouble, which costs something even where they meet nothing.
+        let were_quicker = !any_lots.is_beginning() && any_lots.quickest() == LISTS;
+        let is_cheap = any_lots.quickest() != LISTS && least_by_lists.is_some_and(|least| any.last() < least);
+        let in_beams = any.quickest() == BEAM && !were_quicker;
+        if !is_lot(accel, any, rays) || in_beams || is_cheap {
             Self::occluded_squares(any, accel, places, rays, active, occluded);
             return any_lots.pass(any.last());
         }
