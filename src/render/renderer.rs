@@ -260,7 +260,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let view = wanted.seen.view;
         let mut task = TileTask {
             accel: self.accel,
-            calls,
+            calls: calls.within(tuning.tile),
             shader: Shader::new(self.surface, wanted.lighting, shadows),
             view,
             samples,
@@ -444,7 +444,7 @@ impl<'a, S: Surface> Renderer<'a, S> {
         let lookahead = self.lookahead(&jobs, wanted.seen, &workers);
         let outcome = workers.run(
             jobs,
-            || Scratch::<W>::new(self.learnt.take()),
+            || Scratch::<W>::new(self.learnt.take(), task.calls.side, task.calls.lots),
             |scratch: &mut Scratch<W>, pixels: TilePixels<'_>| {
                 if let Some(lookahead) = &lookahead {
                     lookahead.at(&pixels.tile);

@@ -24,6 +24,11 @@ impl<const W: usize> Calls<W>
 where
     RayPacket<W>: PacketWidth<W>,
 {
+    /// The same in tiles of such a side, where there may be no room for so many lots.
+    pub fn within(self, tile: u32) -> Self {
+        Self { lots: self.lots.min(tile.div_ceil(self.side)), ..self }
+    }
+
     /// Packet by packet.
     pub const PACKETS: Self = Self {
         side: SQUARE,

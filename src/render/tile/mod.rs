@@ -104,10 +104,11 @@ pub(super) struct Scratch<const W: usize> {
 }
 
 impl<const W: usize> Scratch<W> {
-    /// Empty, with what has been learnt before about kernels.
-    pub fn new(dispatch: Dispatch) -> Self {
-        let of_lot = SQUARES * BATCH / W;
-        let count = FIELD * of_lot;
+    /// Empty, with what has been learnt before about kernels, and room for so many squares of pixels, to the right and down, of such a
+    /// side.
+    pub fn new(dispatch: Dispatch, side: u32, lots: u32) -> Self {
+        let of_lot = (side * side) as usize / W;
+        let count = (lots * lots) as usize * of_lot;
         Self {
             blocks: vec![Block { x: 0, y: 0 }; count],
             active: vec![0; count],
@@ -369,7 +370,7 @@ mod tests {
         let mut seen = vec![0; tile.pixels()];
         let (width, height) = block_size(W);
         assert_eq!((width * height) as usize, W);
-        let mut scratch = Scratch::<W>::new(Dispatch::default());
+        let mut scratch = Scratch::<W>::new(Dispatch::default(), side, 1);
         for y in (0..tile.height).step_by(side as usize) {
             for x in (0..tile.width).step_by(side as usize) {
                 let used = scratch.cover(&tile, (x, y), side, 0);

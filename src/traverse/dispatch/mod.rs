@@ -136,11 +136,7 @@ impl Dispatch {
         }
         // Only where lots go as lists a longer list may be better.
         let Self { any_fields, any_lots, any, .. } = self;
-        let in_lists = is_lot(accel, any, rays)
-            && any.quickest() != BEAM
-            && !any_lots.is_beginning()
-            && any_lots.quickest() == LISTS;
-        if !in_lists {
+        if !is_lot(accel, any, rays) || any.quickest() == BEAM || !go_as_lists(any_lots) {
             return self.occluded_lots(accel, places, rays, active, occluded);
         }
         let mut choice = *any_fields;
@@ -190,9 +186,8 @@ impl Dispatch {
         let Self { any_lots, any, least_by_lists, .. } = self;
         // Where beams are quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
         // through little are not worth a list's trouble, which costs something even where they meet nothing.
-        let were_quicker = !any_lots.is_beginning() && any_lots.quickest() == LISTS;
         let is_cheap = any_lots.quickest() != LISTS && least_by_lists.is_some_and(|least| any.last() < least);
-        let in_beams = any.quickest() == BEAM && !were_quicker;
+        let in_beams = any.quickest() == BEAM && !go_as_lists(any_lots);
         if !is_lot(accel, any, rays) || in_beams || is_cheap {
             Self::occluded_squares(any, accel, places, rays, active, occluded);
             return any_lots.pass(any.last());
@@ -244,6 +239,11 @@ impl Dispatch {
     }
 }
 
+/// Whether lists have turned out to be quicker for lots.
+fn go_as_lists(any_lots: &Choice<{ ANY_LOT_WAYS.len() }>) -> bool {
+    !any_lots.is_beginning() && any_lots.quickest() == LISTS
+}
+
 /// Has packets traced square by square, each by the kernel that is quickest at its place; `trace` writes a square's answers.
 #[inline(always)]
 fn by_squares<'a, A>(
@@ -255,14 +255,15 @@ fn by_squares<'a, A>(
     answers: &mut [A],
     trace: impl Fn(Kernel, &[RayPacket<16>], &[u32], &mut [A]),
 ) {
+    let (squares, count_of_all) = (rays.len().div_ceil(PACKETS), count(active));
     let in_beams = is_lot(accel, choice, rays)
-        && count(active) >= LEAST_RAYS
-        && are_beams(choice, places.clone(), rays.len().div_ceil(PACKETS));
+        && count_of_all >= LEAST_RAYS
+        && are_beams(choice, places.clone(), squares);
     let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
     if in_beams {
         let trace_all =
             || squares.for_each(|((rays, active), answers)| trace(WAYS[BEAM], rays, active, answers));
-        recorded(accel, choice, BEAM, count(active), trace_all);
+        recorded(accel, choice, BEAM, count_of_all, trace_all);
         return;
     }
     for (((rays, active), answers), place) in squares.zip(places.chain(std::iter::repeat(None))) {

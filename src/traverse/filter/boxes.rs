@@ -57,11 +57,21 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
     /// The rays that go into a box, and where they enter it.
     #[inline(always)]
     fn meet(&self, node: &Boxes, octant: usize, lane: usize) -> (u32, L) {
-        let (mut enters, mut leaves) = (self.tmin, self.closest);
+        let (mut near, mut far) = (self.near, self.far);
         for axis in 0..3 {
             let (down, faces) = (octant >> axis & 1, &node.faces[axis]);
-            let first = L::splat(faces[down][lane]).mul_add(self.inverse[axis], self.near[axis]);
-            let last = L::splat(faces[down ^ 1][lane]).mul_add(self.inverse[axis], self.far[axis]);
+            (near[axis], far[axis]) = (L::splat(faces[down][lane]), L::splat(faces[down ^ 1][lane]));
+        }
+        self.between(&near, &far)
+    }
+
+    /// The rays that go in between near faces and far ones of their own, and where.
+    #[inline(always)]
+    fn between(&self, near: &[L; 3], far: &[L; 3]) -> (u32, L) {
+        let (mut enters, mut leaves) = (self.tmin, self.closest);
+        for axis in 0..3 {
+            let first = near[axis].mul_add(self.inverse[axis], self.near[axis]);
+            let last = far[axis].mul_add(self.inverse[axis], self.far[axis]);
             // (`max` and `min` keep a NaN that stands on their right.)
             (enters, leaves) = (first.max(enters), last.min(leaves));
         }
@@ -155,17 +165,13 @@ pub fn cut_few<L: Sixteen, const ANY: bool>(
     let mut next = at;
     for half in 0..2 {
         let places = L::ids_spread(order, half);
-        let (mut enters, mut leaves) = (seen.tmin, seen.closest);
+        let (mut near, mut far) = (seen.near, seen.far);
         for axis in 0..3 {
             let (down, faces) = (octant >> axis & 1, &node.faces[axis]);
-            let near = L::of_half(L::Half::load(&faces[down])).pick(places);
-            let far = L::of_half(L::Half::load(&faces[down ^ 1])).pick(places);
-            let first = near.mul_add(seen.inverse[axis], seen.near[axis]);
-            let last = far.mul_add(seen.inverse[axis], seen.far[axis]);
-            // (`max` and `min` keep a NaN that stands on their right.)
-            (enters, leaves) = (first.max(enters), last.min(leaves));
+            near[axis] = L::of_half(L::Half::load(&faces[down])).pick(places);
+            far[axis] = L::of_half(L::Half::load(&faces[down ^ 1])).pick(places);
         }
-        let bits = enters.le(leaves).bits() & seen.live;
+        let (bits, enters) = seen.between(&near, &far);
         write::<16, L, ANY>(entries, next, bits, words, enters);
         for place in 0..4 {
             let count = (bits >> (4 * place) & 15).count_ones() as usize;

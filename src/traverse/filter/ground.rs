@@ -19,7 +19,7 @@ pub trait Ground {
     const FEW: u32;
 
     /// Lists of so many rays, or fewer, have a way of their own through an inner place.
-    const SEVERAL: u32;
+    const SEVERAL: u32 = 0;
 
     /// Whether [shears](crate::geometry::triangle::pooled::shears) are kept of rays in place of directions.
     const SHEARS: bool;
@@ -52,7 +52,8 @@ pub trait Ground {
         list: &List,
     );
 
-    /// The same of a list of [up to four](Self::SEVERAL) rays, where sixteen lanes are one register.
+    /// The same of a list of [several](Self::SEVERAL) rays, where sixteen lanes are one register.
+    #[inline(always)]
     fn cut_few<L: Sixteen, const ANY: bool>(
         &self,
         octant: usize,
@@ -60,7 +61,9 @@ pub trait Ground {
         entries: &mut Entries,
         heads: &mut Heads,
         list: &List,
-    );
+    ) {
+        self.cut::<8, L::Half, L::Half, ANY>(octant, lot, entries, heads, list);
+    }
 
     /// Fetches the triangles of the leaf that a list is in.
     fn fetch_triangles<R>(&self, resident: &Resident<'_, R>, list: &List);
@@ -99,7 +102,6 @@ impl OfLines<'_> {
 
 impl Ground for OfLines<'_> {
     const FEW: u32 = 0;
-    const SEVERAL: u32 = 0;
     const SHEARS: bool = false;
     const FETCHES: bool = true;
 
@@ -137,17 +139,6 @@ impl Ground for OfLines<'_> {
         list: &List,
     ) {
         cut::cut::<W, L, F>(&self.0.lines()[Exit(list.exit).line()], octant, lot, entries, heads, list);
-    }
-
-    #[inline(always)]
-    fn cut_few<L: Sixteen, const ANY: bool>(
-        &self,
-        _: usize,
-        _: &Lot,
-        _: &mut Entries,
-        _: &mut Heads,
-        _: &List,
-    ) {
     }
 
     #[inline(always)]
