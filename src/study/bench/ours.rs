@@ -15,7 +15,7 @@ use crate::study::rays::RayKind;
 use crate::traverse::{
     Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
 };
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -96,8 +96,7 @@ impl Ours {
     fn packets<'a, const W: usize>(
         &'a self,
         kernel: Kernel,
-        rays: &[Ray],
-        any_hit: bool,
+        lots: Arc<[PacketLot<W>]>,
     ) -> Box<dyn Contender + 'a>
     where
         RayPacket<W>: PacketWidth<W>,
@@ -112,12 +111,11 @@ impl Ours {
                 *out = accel.occluded_packet(packet, lanes);
             }
         };
-        let lots = Packets::lots(rays, any_hit);
         Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
     }
 
     /// A mode that traces sixteen packets of 16 together, or sixty-four, as far as they are alike.
-    fn tiles<'a>(&'a self, kernel: Kernel, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
+    fn tiles<'a>(&'a self, kernel: Kernel, lots: Arc<[PacketLot<16>]>) -> Box<dyn Contender + 'a> {
         let size = kernel.width() / 16;
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             for ((packets, lanes), out) in rays.tiles(size).zip(hits.chunks_mut(size)) {
@@ -129,14 +127,13 @@ impl Ours {
                 accel.occluded_tile(packets, lanes, out);
             }
         };
-        let lots = Packets::lots(rays, any_hit);
         Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
     }
 
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
     /// chunk, and taken up by whoever comes next: mostly the same worker. No place is remembered from round to
     /// round: in a picture that is new they would be new, too.
-    fn auto<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Box<dyn Contender + 'a> {
+    fn auto<'a>(&'a self, lots: Arc<[PacketLot<16>]>) -> Box<dyn Contender + 'a> {
         let learnt = Arc::new(DispatchPool::<Dispatch>::default());
         let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
@@ -153,7 +150,6 @@ impl Ours {
             }
             learnt.put(dispatch);
         };
-        let lots = Packets::lots(rays, any_hit);
         Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any })
     }
 }
@@ -180,22 +176,31 @@ impl Engine for Ours {
         false
     }
 
+    /// Modes that are given rays in the same form share them, and the memory for what they find. With memory of its own, one and the
+    /// same kernel was up to a tenth slower or quicker than itself, by where that happened to lie.
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
+        let rows: Arc<[_]> = slices(rays, any_hit).into();
+        let fours: OnceCell<Arc<[PacketLot<4>]>> = OnceCell::new();
+        let eights: OnceCell<Arc<[PacketLot<8>]>> = OnceCell::new();
+        let sixteens: OnceCell<Arc<[PacketLot<16>]>> = OnceCell::new();
+        let fours = || fours.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
+        let eights = || eights.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
+        let sixteens = || sixteens.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
         let sliced = |way| -> Box<dyn Contender + 'a> {
-            Box::new(SliceRun { engine: self, way, lots: slices(rays, any_hit) })
+            Box::new(SliceRun { engine: self, way, lots: Arc::clone(&rows) })
         };
         let contender = |kernel| match kernel {
             _ if self.slices => sliced(Way::Named(kernel)),
             Kernel::Single | Kernel::Stream | Kernel::Filter => sliced(Way::Named(kernel)),
-            Kernel::Packet4 => self.packets::<4>(kernel, rays, any_hit),
-            Kernel::Packet8 => self.packets::<8>(kernel, rays, any_hit),
-            Kernel::Packet16 => self.packets::<16>(kernel, rays, any_hit),
-            Kernel::Tile | Kernel::WideTile => self.tiles(kernel, rays, any_hit),
+            Kernel::Packet4 => self.packets(kernel, fours()),
+            Kernel::Packet8 => self.packets(kernel, eights()),
+            Kernel::Packet16 => self.packets(kernel, sixteens()),
+            Kernel::Tile | Kernel::WideTile => self.tiles(kernel, sixteens()),
         };
         let mixed = sliced(Way::Mixed(DispatchPool::default()));
         let kernels = Kernel::ALL.into_iter().map(contender);
         // Squares of a picture are packets.
-        let auto = (!self.slices).then(|| self.auto(rays, any_hit));
+        let auto = (!self.slices).then(|| self.auto(sixteens()));
         kernels.chain(auto).chain([mixed]).collect()
     }
 }
@@ -209,7 +214,7 @@ fn slices(rays: &[Ray], any_hit: bool) -> Vec<Lot<Vec<Ray>, Hit, bool>> {
 struct SliceRun<'a> {
     engine: &'a Ours,
     way: Way,
-    lots: Vec<Lot<Vec<Ray>, Hit, bool>>,
+    lots: Arc<[Lot<Vec<Ray>, Hit, bool>]>,
 }
 
 /// What traces rays that are given one by one.
@@ -310,7 +315,7 @@ type PacketLot<const W: usize> = Lot<Packets<W>, HitPacket<W>, u32>;
 struct PacketRun<'a, const W: usize, C, A> {
     engine: &'a Ours,
     mode: &'static str,
-    lots: Vec<PacketLot<W>>,
+    lots: Arc<[PacketLot<W>]>,
     closest: C,
     any: A,
 }

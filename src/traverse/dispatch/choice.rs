@@ -30,6 +30,8 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug)]
 pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
+    /// What each way costs beside what is timed, as a logarithm.
+    beside: [f32; WAYS],
     /// The kind of place that the next lot is thought to be in.
     here: usize,
     /// Logarithm (base 2) of the nanoseconds a ray of the last lot took.
@@ -63,22 +65,26 @@ const FIRST_KIND: f32 = 2.6;
 /// grow dearer meanwhile are not taken for a way that is slow.
 const FIRST: u32 = 2;
 
-/// The least that a new figure counts, and how much one of a trial does.
-const WEIGHT: f32 = 0.07;
-const WEIGHT_OF_TRIAL: f32 = 0.15;
+/// The least that a new figure counts, and one of a trial. What a lot costs beside the one before differs by a factor of two in the
+/// middle, so that it takes a hundred of them to tell a tenth.
+const WEIGHT: f32 = 0.02;
+const WEIGHT_OF_TRIAL: f32 = 0.03;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
 
 /// The least number of lots between two trials of a slower way.
-const LEAST_WAIT: f32 = 20.0;
+const LEAST_WAIT: f32 = 10.0;
 
 /// How many more for each time that it is slower, squared, once it is known well: after so many lots.
 const WAIT: f32 = 80.0;
-const KNOWN_WELL: f32 = 16.0;
+const KNOWN_WELL: f32 = 12.0;
 
 /// The greatest number: what was true of the places before may be false of those to come.
 const MOST_WAIT: f32 = 800.0;
+
+/// The part of it that is waited where a kind of place is new: what was true elsewhere may be false there.
+const WAIT_WHERE_NEW: f32 = 0.25;
 
 /// The number of lots after a trial that did better than the quickest way is known to.
 const WAIT_AFTER_SURPRISE: f32 = 4.0;
@@ -102,11 +108,24 @@ const BELIEF: f32 = 0.65;
 impl<const WAYS: usize> Default for Choice<WAYS> {
     fn default() -> Self {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
-        Self { kinds: [kind; KINDS], here: KINDS / 2, last: 0.0, lots: 0, by_place: false, is_trial: false }
+        Self {
+            kinds: [kind; KINDS],
+            beside: [0.0; WAYS],
+            here: KINDS / 2,
+            last: 0.0,
+            lots: 0,
+            by_place: false,
+            is_trial: false,
+        }
     }
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
+    /// Among ways of which each costs something beside what is timed, as a logarithm (base 2): it must be so much quicker.
+    pub fn with_costs_beside(beside: [f32; WAYS]) -> Self {
+        Self { beside, ..Self::default() }
+    }
+
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
         (self.by_place, self.is_trial) = (false, true);
@@ -138,6 +157,11 @@ impl<const WAYS: usize> Choice<WAYS> {
         kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
         (self.by_place, self.is_trial) = (false, false);
         true
+    }
+
+    /// Whether next to nothing is here: where lots cost least.
+    pub const fn is_cheapest(&self) -> bool {
+        self.here == 0
     }
 
     /// The same where the way is known to be quickest at the places of all of them, but for one in how many visits that asks
@@ -203,8 +227,8 @@ impl<const WAYS: usize> Choice<WAYS> {
         let Some(nearest) = self.nearest_known(new).filter(|&nearest| nearest != new) else { return };
         let Kind { cost, taken, .. } = self.kinds[nearest];
         let kind = &mut self.kinds[new];
-        *kind = Kind { cost, taken: taken.map(|taken| taken.min(2 * FIRST)), wait: [0.0; WAYS] };
-        kind.wait = std::array::from_fn(|way| kind.wait_of(way));
+        *kind = Kind { cost, taken: taken.map(|taken| taken.min(FIRST)), wait: [0.0; WAYS] };
+        kind.wait = std::array::from_fn(|way| kind.wait_of(way) * WAIT_WHERE_NEW);
     }
 
     /// The way that is thought to be quickest for the next lot.
@@ -252,7 +276,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         let before = if self.lots == 0 { new } else { self.last };
         let kind = &mut self.kinds[self.here];
         let quickest = kind.quickest();
-        let cost = (new - before).clamp(-SPIKE, SPIKE);
+        let cost = (new + self.beside[way] - before).clamp(-SPIKE, SPIKE);
         let surprise = way != quickest && cost < kind.cost[quickest];
         kind.taken[way] = kind.taken[way].saturating_add(1);
         let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };

@@ -11,8 +11,8 @@
 //! where they do not: which is better is learnt from what a *lot* of four has cost either way. If they do neither, each of
 //! them is chosen for by itself, as triangles as small as pixels want it. Where lots go as lists, up to four lots may be one list.
 //!
-//! What a choice costs counts where rays take 10 ns. So where squares go best as beams, and nothing else is to be tried, a lot's
-//! squares are timed together.
+//! What a choice costs counts where rays take 10 ns. So where squares go best as beams, or there is next to nothing to be met, and
+//! nothing else is to be tried, a lot's squares are timed together.
 
 mod choice;
 mod places;
@@ -46,12 +46,16 @@ const BEAM: usize = 0;
 const LOT_WAYS: [Kernel; 2] = [Kernel::WideTile, Kernel::Tile];
 const ANY_LOT_WAYS: [Kernel; 2] = [Kernel::Filter, Kernel::Tile];
 
+/// What a lot costs beside what is timed, as a logarithm: lots that go one way and another by turns find neither the code nor what
+/// it works with at hand. Where each other lot of the statue's camera rays went wide, all took 1.085 times as long as small beams,
+/// where wide ones alone take 1.055 times.
+const BESIDE: [f32; LOT_WAYS.len()] = [0.08, 0.0];
+
 /// The first of each.
 const WIDE: usize = 0;
 const LISTS: usize = 0;
 
-/// Packets of a lot, for any hit. More than that are a *field*, for which lists are chosen, or each lot by itself: the more rays,
-/// the longer lists.
+/// Packets of a lot, for any hit. More than that are a *field*, which may go as one list.
 const LOT: usize = 4 * PACKETS;
 
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
@@ -66,15 +70,26 @@ const LEAST_RAYS: usize = 64;
 ///
 /// It is meant for rays that come in the order of a picture, each square's together, one `Dispatch` for
 /// each kind of ray and each thread.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Dispatch {
     lots: Choice<{ LOT_WAYS.len() }>,
     any_lots: Choice<{ ANY_LOT_WAYS.len() }>,
-    any_fields: Choice<{ ANY_LOT_WAYS.len() }>,
     closest: Choice<{ WAYS.len() }>,
     any: Choice<{ WAYS.len() }>,
     /// Logarithm of the least that lists have taken for a ray.
     least_by_lists: Option<f32>,
+}
+
+impl Default for Dispatch {
+    fn default() -> Self {
+        Self {
+            lots: Choice::with_costs_beside(BESIDE),
+            any_lots: Choice::default(),
+            closest: Choice::default(),
+            any: Choice::default(),
+            least_by_lists: None,
+        }
+    }
 }
 
 impl Dispatch {
@@ -134,20 +149,16 @@ impl Dispatch {
         if rays.len() <= LOT {
             return self.occluded_lot(accel, places, rays, active, occluded);
         }
-        // Only where lots go as lists a longer list may be better.
-        let Self { any_fields, any_lots, any, .. } = self;
-        if !is_lot(accel, any, rays) || any.quickest() == BEAM || !go_as_lists(any_lots) {
+        // Longer lists are quicker than short ones. Where all lots are thought to go as lists, they are one.
+        let Self { any_lots, any, .. } = self;
+        let lots = rays.len().div_ceil(LOT);
+        let in_lists = is_lot(accel, any, rays) && go_as_lists(any_lots) && count(active) >= LEAST_RAYS;
+        if !in_lists || !any_lots.settles_on(LISTS, lots) {
             return self.occluded_lots(accel, places, rays, active, occluded);
         }
-        let mut choice = *any_fields;
-        let taken = timed(accel, &ANY_LOT_WAYS, &mut choice, None, count(active), |kernel| match kernel {
-            Kernel::Filter => accel.occluded_lists(rays, active, occluded),
-            _ => self.occluded_lots(accel, places, rays, active, occluded),
-        });
-        self.any_fields = choice;
-        if let Some((LISTS, cost)) = taken {
+        let trace = || accel.occluded_lists(rays, active, occluded);
+        if let Some(cost) = recorded(accel, any_lots, LISTS, count(active), trace) {
             self.passed_as_lists(cost);
-            self.any_lots.pass(cost);
         }
     }
 
@@ -256,14 +267,13 @@ fn by_squares<'a, A>(
     trace: impl Fn(Kernel, &[RayPacket<16>], &[u32], &mut [A]),
 ) {
     let (squares, count_of_all) = (rays.len().div_ceil(PACKETS), count(active));
-    let in_beams = is_lot(accel, choice, rays)
-        && count_of_all >= LEAST_RAYS
-        && are_beams(choice, places.clone(), squares);
+    let may_go_together = is_lot(accel, choice, rays) && count_of_all >= LEAST_RAYS;
+    let together = if may_go_together { way_of_all(choice, places.clone(), squares) } else { None };
     let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
-    if in_beams {
+    if let Some(way) = together {
         let trace_all =
-            || squares.for_each(|((rays, active), answers)| trace(WAYS[BEAM], rays, active, answers));
-        recorded(accel, choice, BEAM, count_of_all, trace_all);
+            || squares.for_each(|((rays, active), answers)| trace(WAYS[way], rays, active, answers));
+        recorded(accel, choice, way, count_of_all, trace_all);
         return;
     }
     for (((rays, active), answers), place) in squares.zip(places.chain(std::iter::repeat(None))) {
@@ -271,17 +281,19 @@ fn by_squares<'a, A>(
     }
 }
 
-/// Whether a lot's squares are all traced as beams, with nothing to be learnt of any by itself.
-fn are_beams<'a>(
+/// The way that all of a lot's squares go, with nothing to be learnt of any by itself: as beams, or, where there is next to nothing,
+/// whichever way.
+fn way_of_all<'a>(
     choice: &mut Choice<{ WAYS.len() }>,
     places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>> + Clone,
     squares: usize,
-) -> bool {
+) -> Option<usize> {
     if places.clone().flatten().next().is_none() {
-        return choice.settles_on(BEAM, squares);
+        let way = if choice.is_cheapest() { choice.quickest() } else { BEAM };
+        return choice.settles_on(way, squares).then_some(way);
     }
     let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
-    places.flatten().all(go_best) && choice.settles_there()
+    (places.flatten().all(go_best) && choice.settles_there()).then_some(BEAM)
 }
 
 /// Whether packets are a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,

@@ -185,6 +185,15 @@ fn places_that_have_the_same_way_are_asked_one_by_one_now_and_then() {
 }
 
 #[test]
+fn what_costs_something_beside_must_be_so_much_quicker() {
+    for (cost, way) in [([29.0, 30.0], 1), ([27.0, 30.0], 0)] {
+        let mut choice = Choice::<2>::with_costs_beside([0.08, 0.0]);
+        let (taken, _) = run(&mut choice, 1000, |_| cost);
+        assert!(taken[way] > 850, "{cost:?}: {taken:?}");
+    }
+}
+
+#[test]
 fn nothing_is_learnt_from_no_rays() {
     let mut choice = Choice::<2>::default();
     assert_eq!(choice.record(0, 0, Duration::from_secs(1)), None);
