@@ -30,7 +30,7 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug)]
 pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
-    /// What each way costs beside what is timed, as a logarithm.
+    /// What each way costs beside what is timed, as a logarithm; infinite of one that is left out.
     beside: [f32; WAYS],
     /// The kind of place that the next lot is thought to be in.
     here: usize,
@@ -126,12 +126,34 @@ impl<const WAYS: usize> Choice<WAYS> {
         Self { beside, ..Self::default() }
     }
 
+    /// Never takes a way from now on.
+    pub fn leave_out(&mut self, way: usize) {
+        if self.is_out(way) {
+            return;
+        }
+        self.beside[way] = f32::INFINITY;
+        for kind in &mut self.kinds {
+            (kind.cost[way], kind.wait[way]) = (f32::INFINITY, f32::INFINITY);
+        }
+    }
+
+    fn is_out(&self, way: usize) -> bool {
+        self.beside[way] == f32::INFINITY
+    }
+
+    /// The number of those that are not left out.
+    fn ways(&self) -> usize {
+        (0..WAYS).filter(|&way| !self.is_out(way)).count()
+    }
+
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
         (self.by_place, self.is_trial) = (false, true);
         if self.is_beginning() {
-            let place = self.lots as usize % (2 * WAYS);
-            return if place < WAYS { place } else { 2 * WAYS - 1 - place };
+            let ways = self.ways();
+            let place = self.lots as usize % (2 * ways);
+            let place = if place < ways { place } else { 2 * ways - 1 - place };
+            return (0..WAYS).filter(|&way| !self.is_out(way)).nth(place).unwrap_or(0);
         }
         self.meet(self.here);
         let kind = &mut self.kinds[self.here];
@@ -173,7 +195,7 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// Whether all ways are being tried for the first time.
     pub fn is_beginning(&self) -> bool {
-        self.lots < 2 * FIRST * WAYS as u32
+        self.lots < 2 * FIRST * self.ways() as u32
     }
 
     /// The way for the next lot, of whose place is known what some ways cost there before: see [`Costs::known`].
@@ -296,6 +318,9 @@ impl<const WAYS: usize> Kind<WAYS> {
         if way == quickest {
             // As what follows would give it. Nearly every lot is one of these, and is spared the power of two.
             return LEAST_WAIT;
+        }
+        if self.cost[way] == f32::INFINITY {
+            return f32::INFINITY;
         }
         let slower = (2.0 * (self.cost[way] - self.cost[quickest])).exp2() - 1.0;
         let known = (self.taken[way] as f32 / KNOWN_WELL).min(1.0);

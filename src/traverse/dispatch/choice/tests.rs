@@ -194,6 +194,28 @@ fn what_costs_something_beside_must_be_so_much_quicker() {
 }
 
 #[test]
+fn what_is_left_out_is_never_taken() {
+    for out in 0..3 {
+        let mut choice = Choice::<3>::default();
+        choice.leave_out(out);
+        choice.leave_out(out);
+        // From lot to lot the work changes by ten times, so that kinds of place are new now and then.
+        let (taken, _) = run(&mut choice, 4000, |lot| {
+            let mut cost = [6.0, 7.0, 8.0].map(|cost| cost * 10f64.powi(lot as i32 / 50 % 3));
+            cost[out] = 1.0;
+            cost
+        });
+        assert_eq!(taken.map(|taken| taken > 0), std::array::from_fn(|way| way != out), "{taken:?}");
+        let known = std::array::from_fn(|way| (way != out).then_some(5.0));
+        for _ in 0..1000 {
+            let way = choice.next_at(&known);
+            assert_ne!(way, out);
+            choice.record(way, 256, Duration::from_nanos(256 * 32));
+        }
+    }
+}
+
+#[test]
 fn nothing_is_learnt_from_no_rays() {
     let mut choice = Choice::<2>::default();
     assert_eq!(choice.record(0, 0, Duration::from_secs(1)), None);
