@@ -32,6 +32,8 @@ pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
     /// What each way costs beside what is timed, as a logarithm; infinite of one that is left out.
     beside: [f32; WAYS],
+    /// Whether kinds of place are told apart.
+    tells_kinds: bool,
     /// The kind of place that the next lot is thought to be in.
     here: usize,
     /// Logarithm (base 2) of the nanoseconds a ray of the last lot took.
@@ -69,6 +71,9 @@ const FIRST: u32 = 2;
 /// middle, so that it takes a hundred of them to tell a tenth.
 const WEIGHT: f32 = 0.02;
 const WEIGHT_OF_TRIAL: f32 = 0.03;
+
+/// What these are multiplied by where kinds of place are not told apart.
+const WEIGHT_OF_ALL_PLACES: f32 = 0.25;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -111,6 +116,7 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
         Self {
             kinds: [kind; KINDS],
             beside: [0.0; WAYS],
+            tells_kinds: true,
             here: KINDS / 2,
             last: 0.0,
             lots: 0,
@@ -121,9 +127,11 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
-    /// Among ways of which each costs something beside what is timed, as a logarithm (base 2): it must be so much quicker.
-    pub fn with_costs_beside(beside: [f32; WAYS]) -> Self {
-        Self { beside, ..Self::default() }
+    /// Among ways that are nearly as quick as one another, and are to one another much as they are everywhere: kinds of place are not
+    /// told apart, so that each figure is of more lots, and changes more slowly. Each way costs something beside what is timed, as a
+    /// logarithm (base 2): it must be so much quicker.
+    pub fn of_all_places(beside: [f32; WAYS]) -> Self {
+        Self { beside, tells_kinds: false, ..Self::default() }
     }
 
     /// Never takes a way from now on.
@@ -208,7 +216,7 @@ impl<const WAYS: usize> Choice<WAYS> {
             return self.next();
         }
         (self.by_place, self.is_trial) = (true, false);
-        let kind = Self::kind_at(least);
+        let kind = self.kind_at(least);
         self.meet(kind);
         let costs = expected(known, &self.kinds[kind].cost);
         let best = smallest(&costs);
@@ -230,7 +238,10 @@ impl<const WAYS: usize> Choice<WAYS> {
     }
 
     /// The kind of place where a lot costs so much.
-    fn kind_at(cost: f32) -> usize {
+    fn kind_at(&self, cost: f32) -> usize {
+        if !self.tells_kinds {
+            return self.here;
+        }
         let place = (cost - FIRST_KIND) / WIDTH + 1.0;
         (place.max(0.0) as usize).min(KINDS - 1)
     }
@@ -263,7 +274,7 @@ impl<const WAYS: usize> Choice<WAYS> {
     pub fn pass(&mut self, cost: f32) {
         self.last = cost;
         if !self.is_beginning() {
-            self.here = Self::kind_at(cost);
+            self.here = self.kind_at(cost);
         }
     }
 
@@ -288,7 +299,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         // All ways are tried in one kind of place at first, before others are told from it. And which kind it is, only what the
         // quickest way takes tells: what is tried may be many times slower.
         if !self.is_trial && !self.is_beginning() {
-            self.here = Self::kind_at(new);
+            self.here = self.kind_at(new);
         }
         Some(new)
     }
@@ -302,6 +313,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         let surprise = way != quickest && cost < kind.cost[quickest];
         kind.taken[way] = kind.taken[way].saturating_add(1);
         let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };
+        let weight = if self.tells_kinds { weight } else { weight * WEIGHT_OF_ALL_PLACES };
         kind.cost[way] += weight.max(1.0 / kind.taken[way] as f32) * (cost - kind.cost[way]);
         kind.wait[way] = if surprise { WAIT_AFTER_SURPRISE } else { kind.wait_of(way) };
     }

@@ -84,7 +84,7 @@ pub struct Dispatch {
 impl Default for Dispatch {
     fn default() -> Self {
         Self {
-            lots: Choice::with_costs_beside(BESIDE),
+            lots: Choice::of_all_places(BESIDE),
             any_lots: Choice::default(),
             closest: Choice::default(),
             any: Choice::default(),

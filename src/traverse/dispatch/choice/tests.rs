@@ -187,9 +187,22 @@ fn places_that_have_the_same_way_are_asked_one_by_one_now_and_then() {
 #[test]
 fn what_costs_something_beside_must_be_so_much_quicker() {
     for (cost, way) in [([29.0, 30.0], 1), ([27.0, 30.0], 0)] {
-        let mut choice = Choice::<2>::with_costs_beside([0.08, 0.0]);
+        let mut choice = Choice::<2>::of_all_places([0.08, 0.0]);
         let (taken, _) = run(&mut choice, 1000, |_| cost);
         assert!(taken[way] > 850, "{cost:?}: {taken:?}");
+    }
+}
+
+#[test]
+fn ways_that_are_to_one_another_as_they_are_everywhere_are_told_apart_by_little() {
+    // The second way is 7 % slower, where the work changes by eight times from lot to lot.
+    for slower in [[1.0, 1.07], [1.07, 1.0]] {
+        let mut choice = Choice::<2>::of_all_places([0.0; 2]);
+        let work =
+            |lot: u32| (3.0 * f64::from(lot.wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 24)).exp2();
+        run(&mut choice, 4000, |lot| slower.map(|slower| 10.0 * slower * work(lot)));
+        let (_, ratio) = run(&mut choice, 4000, |lot| slower.map(|slower| 10.0 * slower * work(lot)));
+        assert!(ratio < 1.02, "{slower:?}: {ratio}");
     }
 }
 
