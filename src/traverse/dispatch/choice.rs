@@ -32,8 +32,8 @@ pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
     /// What each way costs beside what is timed, as a logarithm; infinite of one that is left out.
     beside: [f32; WAYS],
-    /// Whether kinds of place are told apart.
-    tells_kinds: bool,
+    /// The way that is quickest over all kinds of place, if that is taken everywhere.
+    everywhere: Option<usize>,
     /// The kind of place that the next lot is thought to be in.
     here: usize,
     /// Logarithm (base 2) of the nanoseconds a ray of the last lot took.
@@ -72,8 +72,10 @@ const FIRST: u32 = 2;
 const WEIGHT: f32 = 0.02;
 const WEIGHT_OF_TRIAL: f32 = 0.03;
 
-/// What these are multiplied by where kinds of place are not told apart.
-const WEIGHT_OF_ALL_PLACES: f32 = 0.25;
+/// In how many lots a choice for all kinds of place is looked over, and what a way's figure in a kind counts at most, in lots: about as
+/// many as it remembers.
+const LOOKED_OVER: u32 = 16;
+const REMEMBERED: u32 = 100;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -116,7 +118,7 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
         Self {
             kinds: [kind; KINDS],
             beside: [0.0; WAYS],
-            tells_kinds: true,
+            everywhere: None,
             here: KINDS / 2,
             last: 0.0,
             lots: 0,
@@ -127,11 +129,11 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
-    /// Among ways that are nearly as quick as one another, and are to one another much as they are everywhere: kinds of place are not
-    /// told apart, so that each figure is of more lots, and changes more slowly. Each way costs something beside what is timed, as a
-    /// logarithm (base 2): it must be so much quicker.
+    /// Among ways that are to one another much as they are everywhere: the one is taken that is quickest over all kinds of place, so that
+    /// a smaller difference is told from noise. Each way costs something beside what is timed, as a logarithm (base 2): it must be so
+    /// much quicker.
     pub fn of_all_places(beside: [f32; WAYS]) -> Self {
-        Self { beside, tells_kinds: false, ..Self::default() }
+        Self { beside, everywhere: Some(0), ..Self::default() }
     }
 
     /// Never takes a way from now on.
@@ -164,9 +166,9 @@ impl<const WAYS: usize> Choice<WAYS> {
             return (0..WAYS).filter(|&way| !self.is_out(way)).nth(place).unwrap_or(0);
         }
         self.meet(self.here);
+        let quickest = self.quickest();
         let kind = &mut self.kinds[self.here];
         kind.wait.iter_mut().for_each(|wait| *wait -= 1.0);
-        let quickest = kind.quickest();
         let due = (0..WAYS).find(|&way| way != quickest && kind.wait[way] <= 0.0);
         self.is_trial = due.is_some();
         due.unwrap_or(quickest)
@@ -179,9 +181,10 @@ impl<const WAYS: usize> Choice<WAYS> {
             return false;
         }
         self.meet(self.here);
+        let quickest = self.quickest();
         let kind = &mut self.kinds[self.here];
         let is_due = |other: usize| other != way && kind.wait[other] <= lots as f32;
-        if kind.quickest() != way || (0..WAYS).any(is_due) {
+        if quickest != way || (0..WAYS).any(is_due) {
             return false;
         }
         kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
@@ -216,7 +219,7 @@ impl<const WAYS: usize> Choice<WAYS> {
             return self.next();
         }
         (self.by_place, self.is_trial) = (true, false);
-        let kind = self.kind_at(least);
+        let kind = Self::kind_at(least);
         self.meet(kind);
         let costs = expected(known, &self.kinds[kind].cost);
         let best = smallest(&costs);
@@ -238,10 +241,7 @@ impl<const WAYS: usize> Choice<WAYS> {
     }
 
     /// The kind of place where a lot costs so much.
-    fn kind_at(&self, cost: f32) -> usize {
-        if !self.tells_kinds {
-            return self.here;
-        }
+    fn kind_at(cost: f32) -> usize {
         let place = (cost - FIRST_KIND) / WIDTH + 1.0;
         (place.max(0.0) as usize).min(KINDS - 1)
     }
@@ -266,6 +266,9 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// The way that is thought to be quickest for the next lot.
     pub fn quickest(&self) -> usize {
+        if let Some(way) = self.everywhere {
+            return way;
+        }
         self.kinds[self.nearest_known(self.here).unwrap_or(self.here)].quickest()
     }
 
@@ -274,7 +277,7 @@ impl<const WAYS: usize> Choice<WAYS> {
     pub fn pass(&mut self, cost: f32) {
         self.last = cost;
         if !self.is_beginning() {
-            self.here = self.kind_at(cost);
+            self.here = Self::kind_at(cost);
         }
     }
 
@@ -295,13 +298,34 @@ impl<const WAYS: usize> Choice<WAYS> {
             self.learn(way, new);
         }
         self.lots = self.lots.saturating_add(1);
+        if self.everywhere.is_some() && self.lots.is_multiple_of(LOOKED_OVER) {
+            self.everywhere = Some(self.quickest_of_all());
+        }
         self.last = new;
         // All ways are tried in one kind of place at first, before others are told from it. And which kind it is, only what the
         // quickest way takes tells: what is tried may be many times slower.
         if !self.is_trial && !self.is_beginning() {
-            self.here = self.kind_at(new);
+            self.here = Self::kind_at(new);
         }
         Some(new)
+    }
+
+    /// The way that is quickest over all kinds of place: by what sets it apart from the first one in each, weighted by how well that is
+    /// known there. (What ways cost at all hangs on the kind: which one of them was taken where must not count.)
+    fn quickest_of_all(&self) -> usize {
+        let apart: [f32; WAYS] = std::array::from_fn(|way| {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for Kind { cost, taken, .. } in &self.kinds {
+                let [first, other] = [taken[0], taken[way]].map(|taken| taken.min(REMEMBERED) as f32);
+                if first > 0.0 && other > 0.0 {
+                    let weight = first * other / (first + other);
+                    sum += weight * (cost[way] - cost[0]);
+                    weights += weight;
+                }
+            }
+            if weights > 0.0 { sum / weights } else { 0.0 }
+        });
+        smallest(&apart)
     }
 
     /// Learns from what a lot cost.
@@ -313,7 +337,6 @@ impl<const WAYS: usize> Choice<WAYS> {
         let surprise = way != quickest && cost < kind.cost[quickest];
         kind.taken[way] = kind.taken[way].saturating_add(1);
         let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };
-        let weight = if self.tells_kinds { weight } else { weight * WEIGHT_OF_ALL_PLACES };
         kind.cost[way] += weight.max(1.0 / kind.taken[way] as f32) * (cost - kind.cost[way]);
         kind.wait[way] = if surprise { WAIT_AFTER_SURPRISE } else { kind.wait_of(way) };
     }
