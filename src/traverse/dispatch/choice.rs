@@ -155,19 +155,19 @@ impl<const WAYS: usize> Choice<WAYS> {
         self.beside[way] == f32::INFINITY
     }
 
-    /// The number of those that are not left out.
-    fn ways(&self) -> usize {
-        (0..WAYS).filter(|&way| !self.is_out(way)).count()
+    /// Those that are not left out.
+    fn ways(&self) -> impl Iterator<Item = usize> {
+        (0..WAYS).filter(|&way| !self.is_out(way))
     }
 
     /// The way for the next lot.
     pub fn next(&mut self) -> usize {
         (self.by_place, self.is_trial) = (false, true);
         if self.is_beginning() {
-            let ways = self.ways();
+            let ways = self.ways().count();
             let place = self.lots as usize % (2 * ways);
             let place = if place < ways { place } else { 2 * ways - 1 - place };
-            return (0..WAYS).filter(|&way| !self.is_out(way)).nth(place).unwrap_or(0);
+            return self.ways().nth(place).unwrap_or(0);
         }
         self.meet(self.here);
         let quickest = self.quickest();
@@ -210,7 +210,7 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// Whether all ways are being tried for the first time.
     pub fn is_beginning(&self) -> bool {
-        self.lots < 2 * FIRST * self.ways() as u32
+        self.lots < 2 * FIRST * self.ways().count() as u32
     }
 
     /// The way for the next lot, of whose place is known what some ways cost there before: see [`Costs::known`].

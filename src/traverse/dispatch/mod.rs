@@ -253,8 +253,7 @@ impl Dispatch {
     }
 }
 
-/// Leaves out packets of 8 where a register holds sixteen rays: never the quickest there, they took a twentieth of the time of pictures
-/// that were the first of their kind to be tried.
+/// Leaves out packets of 8 where a register holds sixteen rays. They never are the quickest there, and were tried for nothing.
 fn leave_out_halves<const N: usize>(accel: &Accel, ways: &[Kernel; N], choice: &mut Choice<N>) {
     if accel.isa() == Isa::Avx512
         && let Some(halves) = ways.iter().position(|&way| way == Kernel::Packet8)
