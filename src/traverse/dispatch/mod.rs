@@ -56,7 +56,7 @@ const BESIDE: [f32; LOT_WAYS.len()] = [0.08, 0.0];
 const WIDE: usize = 0;
 const LISTS: usize = 0;
 
-/// Packets of a lot, for any hit. More than that are a *field*, which may go as one list.
+/// Packets of a lot. More than that are a *field*, which for any hit may go as one list.
 const LOT: usize = 4 * PACKETS;
 
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
@@ -94,8 +94,8 @@ impl Default for Dispatch {
 }
 
 impl Dispatch {
-    /// As [`Accel::intersect_tile`], by the kernel that is quickest at these places, one for each sixteen packets; of
-    /// squares that have none nothing is known.
+    /// As [`Accel::intersect_packet`] for each of some packets, by the kernel that is quickest at these places, one for each sixteen
+    /// packets; of squares that have none nothing is known.
     pub fn intersect(
         &mut self,
         accel: &Accel,
@@ -105,6 +105,21 @@ impl Dispatch {
         hits: &mut [HitPacket<16>],
     ) {
         leave_out_halves(accel, &WAYS, &mut self.closest);
+        let mut places = places.chunks(LOT / PACKETS);
+        for ((rays, active), hits) in rays.chunks(LOT).zip(active.chunks(LOT)).zip(hits.chunks_mut(LOT)) {
+            self.intersect_lot(accel, places.next().unwrap_or(&[]), rays, active, hits);
+        }
+    }
+
+    /// The same for one lot.
+    fn intersect_lot(
+        &mut self,
+        accel: &Accel,
+        places: &[Place<'_>],
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [HitPacket<16>],
+    ) {
         let Self { lots, closest, .. } = self;
         // Where packets are quicker than beams, wide ones are out of the question.
         let packets_were_quicker =
@@ -139,7 +154,7 @@ impl Dispatch {
         });
     }
 
-    /// As [`Accel::occluded_tile`], likewise.
+    /// As [`Accel::occluded_packet`] for each, likewise.
     pub fn occluded(
         &mut self,
         accel: &Accel,
@@ -364,42 +379,4 @@ fn count(active: &[u32]) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Ray;
-    use crate::kdtree::BuildParams;
-    use crate::mesh::generate::shapes;
-    use glam::Vec3;
-
-    #[test]
-    fn lots_of_any_size_are_answered_as_their_packets_are() {
-        let accel = Accel::build(&shapes::soup(300, 1), &BuildParams::default()).expect("a soup has a tree");
-        let packet = |lot: usize, i: usize| {
-            let ray = |lane: usize| {
-                let place = |k: usize| ((lot * 7 + i * 16 + lane) * k % 97) as f32 / 97.0 - 0.5;
-                Ray::new(Vec3::new(0.5, 0.5, 3.0), Vec3::new(place(3), place(5), -2.5))
-            };
-            RayPacket::of_slice(&std::array::from_fn::<_, 16, _>(ray))
-        };
-        let mut dispatch = Dispatch::default();
-        let places = Places::new(16);
-        for lot in 0..60 {
-            let count = [64, 256, 16, 37, 150, 1][lot % 6];
-            let rays: Vec<RayPacket<16>> = (0..count).map(|i| packet(lot, i)).collect();
-            let active: Vec<u32> = (0..count).map(|i| 0xffff >> (i % 5)).collect();
-            let at: Vec<Place<'_>> = (0..lot % 17).map(|square| places.at(square)).collect();
-            let (mut hits, mut occluded) = (vec![HitPacket::miss(); count], vec![0; count]);
-            dispatch.intersect(&accel, &at, &rays, &active, &mut hits);
-            dispatch.occluded(&accel, &at, &rays, &active, &mut occluded);
-            for i in 0..count {
-                assert_eq!(hits[i], accel.intersect_packet(&rays[i], active[i]), "packet {i} of lot {lot}");
-                assert_eq!(
-                    occluded[i],
-                    accel.occluded_packet(&rays[i], active[i]),
-                    "packet {i} of lot {lot}"
-                );
-            }
-        }
-        assert!(!dispatch.closest.is_beginning() && !dispatch.any.is_beginning());
-    }
-}
+mod tests;
