@@ -15,7 +15,7 @@ use crate::study::rays::RayKind;
 use crate::traverse::{
     Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
 };
-use std::cell::{OnceCell, RefCell};
+use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -180,27 +180,25 @@ impl Engine for Ours {
     /// same kernel was up to a tenth slower or quicker than itself, by where that happened to lie.
     fn contenders<'a>(&'a self, rays: &[Ray], any_hit: bool) -> Vec<Box<dyn Contender + 'a>> {
         let rows: Arc<[_]> = slices(rays, any_hit).into();
-        let fours: OnceCell<Arc<[PacketLot<4>]>> = OnceCell::new();
-        let eights: OnceCell<Arc<[PacketLot<8>]>> = OnceCell::new();
-        let sixteens: OnceCell<Arc<[PacketLot<16>]>> = OnceCell::new();
-        let fours = || fours.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
-        let eights = || eights.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
-        let sixteens = || sixteens.get_or_init(|| Packets::lots(rays, any_hit).into()).clone();
+        let packed = if self.slices { &[] } else { rays };
+        let fours: Arc<[_]> = Packets::<4>::lots(packed, any_hit).into();
+        let eights: Arc<[_]> = Packets::<8>::lots(packed, any_hit).into();
+        let sixteens: Arc<[_]> = Packets::<16>::lots(packed, any_hit).into();
         let sliced = |way| -> Box<dyn Contender + 'a> {
             Box::new(SliceRun { engine: self, way, lots: Arc::clone(&rows) })
         };
         let contender = |kernel| match kernel {
             _ if self.slices => sliced(Way::Named(kernel)),
             Kernel::Single | Kernel::Stream | Kernel::Filter => sliced(Way::Named(kernel)),
-            Kernel::Packet4 => self.packets(kernel, fours()),
-            Kernel::Packet8 => self.packets(kernel, eights()),
-            Kernel::Packet16 => self.packets(kernel, sixteens()),
-            Kernel::Tile | Kernel::WideTile => self.tiles(kernel, sixteens()),
+            Kernel::Packet4 => self.packets(kernel, Arc::clone(&fours)),
+            Kernel::Packet8 => self.packets(kernel, Arc::clone(&eights)),
+            Kernel::Packet16 => self.packets(kernel, Arc::clone(&sixteens)),
+            Kernel::Tile | Kernel::WideTile => self.tiles(kernel, Arc::clone(&sixteens)),
         };
         let mixed = sliced(Way::Mixed(DispatchPool::default()));
         let kernels = Kernel::ALL.into_iter().map(contender);
         // Squares of a picture are packets.
-        let auto = (!self.slices).then(|| self.auto(sixteens()));
+        let auto = (!self.slices).then(|| self.auto(Arc::clone(&sixteens)));
         kernels.chain(auto).chain([mixed]).collect()
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Where triangles are larger than pixels, a square's rays go best together in a beam; where they are
 //! smaller, packet by packet; and where each ray of a packet meets triangles of its own, in smaller
-//! packets. Pictures hold all of that. How quick a kernel is hangs on the model, the view, the machine and
+//! packets, unless a register holds a whole one. Pictures hold all of that. How quick a kernel is hangs on the model, the view, the machine and
 //! its instruction set, and nothing that could be known beforehand tells it as well as having tried: so a
 //! [`Dispatch`] times what it does, square by square, and does what was quickest nearby, or, in a picture that is not the
 //! first of its kind, at that [place](Places). Only time hangs on the choice: hits are the same, bit for bit.
@@ -105,9 +105,8 @@ impl Dispatch {
         hits: &mut [HitPacket<16>],
     ) {
         leave_out_halves(accel, &WAYS, &mut self.closest);
-        let mut places = places.chunks(LOT / PACKETS);
-        for ((rays, active), hits) in rays.chunks(LOT).zip(active.chunks(LOT)).zip(hits.chunks_mut(LOT)) {
-            self.intersect_lot(accel, places.next().unwrap_or(&[]), rays, active, hits);
+        for (places, rays, active, hits) in lots_of(places, rays, active, hits) {
+            self.intersect_lot(accel, places, rays, active, hits);
         }
     }
 
@@ -164,19 +163,19 @@ impl Dispatch {
         occluded: &mut [u32],
     ) {
         leave_out_halves(accel, &WAYS, &mut self.any);
-        if rays.len() <= LOT {
-            return self.occluded_lot(accel, places, rays, active, occluded);
-        }
         // Longer lists are quicker than short ones. Where all lots are thought to go as lists, they are one.
         let Self { any_lots, any, .. } = self;
-        let lots = rays.len().div_ceil(LOT);
-        let in_lists = is_lot(accel, any, rays) && go_as_lists(any_lots) && count(active) >= LEAST_RAYS;
-        if !in_lists || !any_lots.settles_on(LISTS, lots) {
-            return self.occluded_lots(accel, places, rays, active, occluded);
+        let (lots, count) = (rays.len().div_ceil(LOT), count(active));
+        let in_lists = lots > 1 && is_lot(accel, any, rays) && go_as_lists(any_lots) && count >= LEAST_RAYS;
+        if in_lists && any_lots.settles_on(LISTS, lots) {
+            let trace = || accel.occluded_lists(rays, active, occluded);
+            if let Some(cost) = recorded(accel, any_lots, LISTS, count, trace) {
+                self.passed_as_lists(cost);
+            }
+            return;
         }
-        let trace = || accel.occluded_lists(rays, active, occluded);
-        if let Some(cost) = recorded(accel, any_lots, LISTS, count(active), trace) {
-            self.passed_as_lists(cost);
+        for (places, rays, active, occluded) in lots_of(places, rays, active, occluded) {
+            self.occluded_lot(accel, places, rays, active, occluded);
         }
     }
 
@@ -184,23 +183,6 @@ impl Dispatch {
     fn passed_as_lists(&mut self, cost: f32) {
         self.any.pass(cost);
         self.least_by_lists = Some(self.least_by_lists.map_or(cost, |least| least.min(cost)));
-    }
-
-    /// The same, lot by lot.
-    fn occluded_lots(
-        &mut self,
-        accel: &Accel,
-        places: &[Place<'_>],
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        occluded: &mut [u32],
-    ) {
-        let mut places = places.chunks(LOT / PACKETS);
-        for ((rays, active), occluded) in
-            rays.chunks(LOT).zip(active.chunks(LOT)).zip(occluded.chunks_mut(LOT))
-        {
-            self.occluded_lot(accel, places.next().unwrap_or(&[]), rays, active, occluded);
-        }
     }
 
     /// The same for one lot.
@@ -266,6 +248,18 @@ impl Dispatch {
             if any == Kernel::Tile { any } else { of_lots(any, &self.any_lots, ANY_LOT_WAYS) },
         ]
     }
+}
+
+/// Lots of packets one after the other, each with what is known of its places, which may be less than all, and the room for its answers.
+fn lots_of<'a, 'p, A>(
+    places: &'a [Place<'p>],
+    rays: &'a [RayPacket<16>],
+    active: &'a [u32],
+    answers: &'a mut [A],
+) -> impl Iterator<Item = (&'a [Place<'p>], &'a [RayPacket<16>], &'a [u32], &'a mut [A])> {
+    let places = places.chunks(LOT / PACKETS).chain(std::iter::repeat(&[] as &[_]));
+    let lots = rays.chunks(LOT).zip(active.chunks(LOT)).zip(answers.chunks_mut(LOT)).zip(places);
+    lots.map(|(((rays, active), answers), places)| (places, rays, active, answers))
 }
 
 /// Leaves out packets of 8 where a register holds sixteen rays. They never are the quickest there, and were tried for nothing.
