@@ -9,10 +9,19 @@ use crate::simd::Dense;
 /// first one.
 #[inline(always)]
 pub fn columns<const W: usize, L: Dense<W>>(rays: &[Ray]) -> [[L; 4]; 2] {
+    columns_by(
+        #[inline(always)]
+        |lane| rays.get(lane).or(rays.first()),
+    )
+}
+
+/// The same of a ray for each lane, which is read where it lies; zeros where there is none.
+#[inline(always)]
+pub fn columns_by<'a, const W: usize, L: Dense<W>>(ray: impl Fn(usize) -> Option<&'a Ray>) -> [[L; 4]; 2] {
     let nowhere = &[0.0; 4];
     let (mut starts, mut ways) = ([nowhere; W], [nowhere; W]);
     for lane in 0..W {
-        if let Some(ray) = rays.get(lane).or(rays.first()) {
+        if let Some(ray) = ray(lane) {
             let [start, way]: &[[f32; 4]; 2] = bytemuck::cast_ref(ray);
             (starts[lane], ways[lane]) = (start, way);
         }

@@ -1,7 +1,7 @@
 //! Where a kernel's rays come from: a slice, or packets. (A branch for each sixteen of them costs nothing, and a kernel for each
 //! would have to be compiled for every instruction set and mode.)
 
-use super::columns::columns;
+use super::columns::{columns, columns_by};
 use super::lanes::RayPacket;
 use super::walk::load3;
 use crate::geometry::Ray;
@@ -59,9 +59,18 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The same as two rows: origin and `tnear`, direction and `tfar`.
+    /// The rays in some places, number by number as for [`sixteen`](Self::sixteen). Panics if there is no such place.
     #[inline(always)]
-    pub fn rows(self, place: usize) -> [[f32; 4]; 2] {
-        bytemuck::cast(self.ray(place))
+    pub fn in_places<L: Sixteen>(self, places: &[i32; 16]) -> [[L; 4]; 2] {
+        match self {
+            Self::Slice(rays) => columns_by(
+                #[inline(always)]
+                |lane| Some(&rays[places[lane] as usize]),
+            ),
+            Self::Packets(..) => {
+                let rays = places.map(|place| self.ray(place as usize));
+                columns(&rays)
+            }
+        }
     }
 }

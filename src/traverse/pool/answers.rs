@@ -125,15 +125,13 @@ pub trait Told: Answers {
     ) {
         let triangles = tree.tree.triangles();
         let nowhere = &[0.0; 4];
-        let (mut starts, mut ways) = ([[0.0; 4]; 16], [[0.0; 4]; 16]);
         let mut fours = [[nowhere; 16]; 3];
         for lane in 0..16 {
-            [starts[lane], ways[lane]] = rays.rows(pairs.rays[lane] as usize);
             let [a, b, c] = triangles[pairs.primitives[lane] as usize].fours();
             (fours[0][lane], fours[1][lane], fours[2][lane]) = (a, b, c);
         }
-        let [ox, oy, oz, tnear] = S::F16::of_fours(&starts.each_ref());
-        let [dx, dy, dz, tfar] = S::F16::of_fours(&ways.each_ref());
+        let first = pairs.rays.first_chunk().expect("room for more than sixteen");
+        let [[ox, oy, oz, tnear], [dx, dy, dz, tfar]] = rays.in_places::<S::F16>(first);
         let [ax, ay, az, bx] = S::F16::of_fours(&fours[0]);
         let [by, bz, cx, cy] = S::F16::of_fours(&fours[1]);
         let [cz, nx, ny, nz] = S::F16::of_fours(&fours[2]);
