@@ -23,6 +23,12 @@
 //! # Ok::<(), raypack::Error>(())
 //! ```
 //!
+//! # In which order
+//!
+//! Any, as answers are the same. But rays that have something in common are quicker if they follow one another. That holds also for those
+//! that start anywhere and run anywhere: through pools ([`Accel::make_pools`]), lists trace them up to 1.6 times as fast if those whose directions have the same
+//! signs come together, and of these, those that start near one another (`docs/incoherent.md`).
+//!
 //! # What an answer says
 //!
 //! The same as that of [`Accel::intersect`] and [`Accel::occluded`], to the bit, whatever the kernel,

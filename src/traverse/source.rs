@@ -74,3 +74,41 @@ impl<'a> Source<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Chosen, Isa, Lanes, Simd, Task};
+    use glam::Vec3;
+
+    /// The rays in some places, number by number.
+    struct InPlaces<'a>(Source<'a>, &'a [i32; 16]);
+
+    impl Task for InPlaces<'_> {
+        type Output = [[[f32; 16]; 4]; 2];
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> Self::Output {
+            self.0.in_places::<S::F16>(self.1).map(|four| four.map(|column| column.store()))
+        }
+    }
+
+    #[test]
+    fn rays_come_from_any_places_of_a_slice_or_of_packets() {
+        let point = |i: usize| Vec3::new(i as f32, i as f32 + 0.25, i as f32 - 0.5);
+        let ray = |i: usize| Ray::segment(point(i), -point(100 + i), i as f32 / 8.0, 1000.0 + i as f32);
+        let rays: Vec<Ray> = (0..48).map(ray).collect();
+        let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
+        // One of them twice.
+        let places = [47, 0, 5, 31, 16, 15, 20, 20, 1, 2, 40, 33, 9, 8, 7, 6];
+        for isa in Isa::available() {
+            for source in [Source::Slice(&rays), Source::Packets(&packets, &[0xffff; 3])] {
+                let found = Chosen::new(isa).expect("it is available").run(InPlaces(source, &places));
+                for (lane, place) in places.into_iter().enumerate() {
+                    let expected: [[f32; 4]; 2] = bytemuck::cast(rays[place as usize]);
+                    assert_eq!(found.map(|four| four.map(|column| column[lane])), expected, "{isa}, {place}");
+                }
+            }
+        }
+    }
+}
