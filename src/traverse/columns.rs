@@ -30,7 +30,7 @@ pub fn columns_by<'a, const W: usize, L: Dense<W>>(ray: impl Fn(usize) -> Option
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::simd::{Chosen, Isa, Lanes, Simd, Task};
     use glam::Vec3;
@@ -52,11 +52,16 @@ mod tests {
         }
     }
 
-    #[test]
-    fn rays_come_into_lanes_and_the_first_one_fills_up() {
+    /// Rays that differ in every number.
+    pub fn rays(count: usize) -> Vec<Ray> {
         let point = |i: usize| Vec3::new(i as f32, i as f32 + 0.25, i as f32 - 0.5);
         let ray = |i: usize| Ray::segment(point(i), -point(100 + i), i as f32 / 8.0, 1000.0 + i as f32);
-        let rays: Vec<Ray> = (0..20).map(ray).collect();
+        (0..count).map(ray).collect()
+    }
+
+    #[test]
+    fn rays_come_into_lanes_and_the_first_one_fills_up() {
+        let rays = rays(20);
         for isa in Isa::available() {
             for count in 1..=20 {
                 let chosen = Chosen::new(isa).expect("it is available");

@@ -79,7 +79,7 @@ impl<'a> Source<'a> {
 mod tests {
     use super::*;
     use crate::simd::{Chosen, Isa, Lanes, Simd, Task};
-    use glam::Vec3;
+    use crate::traverse::columns::tests::rays;
 
     /// The rays in some places, number by number.
     struct InPlaces<'a>(Source<'a>, &'a [i32; 16]);
@@ -95,9 +95,7 @@ mod tests {
 
     #[test]
     fn rays_come_from_any_places_of_a_slice_or_of_packets() {
-        let point = |i: usize| Vec3::new(i as f32, i as f32 + 0.25, i as f32 - 0.5);
-        let ray = |i: usize| Ray::segment(point(i), -point(100 + i), i as f32 / 8.0, 1000.0 + i as f32);
-        let rays: Vec<Ray> = (0..48).map(ray).collect();
+        let rays = rays(48);
         let packets: Vec<RayPacket<16>> = rays.chunks(16).map(RayPacket::of_slice).collect();
         // One of them twice.
         let places = [47, 0, 5, 31, 16, 15, 20, 20, 1, 2, 40, 33, 9, 8, 7, 6];
