@@ -329,3 +329,28 @@ fn wide_beams_find_what_packets_do_alone() {
         }
     }
 }
+
+#[test]
+fn beams_that_see_nothing_but_sky_miss_in_their_own_lanes() {
+    let tree = Accel::build(&sphere(3).mesh, &BuildParams::default()).expect("builds");
+    let eye = Vec3::new(0.0, 0.3, 5.0);
+    // Away from everything, and past it; some lanes are not there, and some packets.
+    for at in [Vec3::new(0.0, 0.3, 9.0), Vec3::new(4.0, 0.3, 0.0)] {
+        let packets = wide_picture(eye, at, 20.0);
+        let active: Vec<u32> = (0..64).map(|i| [0xffff, 0x0ff3, 0, 0x8000][i % 4]).collect();
+        let mut counts = TileCounts::default();
+        tree.count_tile(&packets[..16], &[0xffff; 16], false, &mut counts);
+        assert_eq!((counts.beams, counts.nodes), (1, 0), "it is a beam, and comes to no node");
+        for isa in Isa::available() {
+            let accel = tree.clone().with_isa(isa);
+            for (count, lanes) in
+                [16, 17, 64].into_iter().flat_map(|count| [(count, &[0xffff; 64][..]), (count, &active)])
+            {
+                let mut hits =
+                    vec![HitPacket { t: [7.0; 16], primitive: [3; 16], ..HitPacket::miss() }; count];
+                accel.intersect_tile(&packets[..count], &lanes[..count], &mut hits);
+                assert!(hits.iter().all(|hits| *hits == HitPacket::miss()), "{isa}, {count} packets");
+            }
+        }
+    }
+}

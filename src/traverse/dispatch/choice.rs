@@ -76,10 +76,14 @@ const FIRST: u32 = 2;
 const WEIGHT: f32 = 0.02;
 const WEIGHT_OF_TRIAL: f32 = 0.03;
 
+/// The same of a choice for all kinds of place, which has all lots to learn from, and less to tell apart: with as much as above, what it
+/// took changed within a picture though nothing else had.
+const WEIGHT_EVERYWHERE: f32 = 0.005;
+
 /// In how many lots a choice for all kinds of place is looked over, and what a way's figure in a kind counts at most, in lots: about as
 /// many as it remembers.
 const LOOKED_OVER: u32 = 8;
-const REMEMBERED: u32 = 100;
+const REMEMBERED: u32 = 400;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -343,7 +347,11 @@ impl<const WAYS: usize> Choice<WAYS> {
         let cost = (new + self.beside[way] - before).clamp(-SPIKE, SPIKE);
         let surprise = way != quickest && cost < kind.cost[quickest];
         kind.taken[way] = kind.taken[way].saturating_add(1);
-        let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };
+        let weight = match self.everywhere {
+            Some(_) => WEIGHT_EVERYWHERE,
+            None if way == quickest => WEIGHT,
+            None => WEIGHT_OF_TRIAL,
+        };
         kind.cost[way] += weight.max(1.0 / kind.taken[way] as f32) * (cost - kind.cost[way]);
         kind.wait[way] = if surprise { WAIT_AFTER_SURPRISE } else { kind.wait_of(way) };
     }

@@ -40,7 +40,7 @@ use super::closest::Normals;
 use super::lanes::{HitPacket, RayPacket};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Simd, Sixteen};
+use crate::simd::{Lanes, Mask, Simd, Sixteen};
 use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
 use form::{Form, Seen, Slopes};
@@ -155,6 +155,11 @@ where
     };
     let extent = Extent::of_lanes(&extents);
     let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
+    if !interval.live().any() {
+        // Nothing but sky. It is a large part of many a picture, and what comes now makes ready for more than that.
+        miss(&belong, hits);
+        return Done { lanes: belong, work: Some(work) };
+    }
     let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
     bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
@@ -168,6 +173,14 @@ where
         }
     }
     Done { lanes: belong, work }
+}
+
+/// Writes misses in the given lanes.
+#[inline(always)]
+fn miss<const K: usize>(lanes: &[[u32; PACKETS]; K], hits: &mut [HitPacket<16>]) {
+    for (hits, &lanes) in hits.iter_mut().zip(lanes.as_flattened()) {
+        hits.set_part(0, &HitPacket::<16>::miss(), lanes);
+    }
 }
 
 /// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
