@@ -105,31 +105,24 @@ impl Dispatch {
         hits: &mut [HitPacket<16>],
     ) {
         leave_out_halves(accel, &WAYS, &mut self.closest);
-        for (places, rays, active, hits) in lots_of(places, rays, active, hits) {
-            self.intersect_lot(accel, places, rays, active, hits);
+        for lot in (Asked { places, rays, active, answers: hits }).lots() {
+            self.intersect_lot(accel, lot);
         }
     }
 
     /// The same for one lot.
-    fn intersect_lot(
-        &mut self,
-        accel: &Accel,
-        places: &[Place<'_>],
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        hits: &mut [HitPacket<16>],
-    ) {
+    fn intersect_lot(&mut self, accel: &Accel, lot: Asked<'_, '_, HitPacket<16>>) {
         let Self { lots, closest, .. } = self;
         // Where packets are quicker than beams, wide ones are out of the question.
         let packets_were_quicker =
             |place: &Place<'_>| place.closest.is_some_and(|costs| costs.is_slower(BEAM));
-        let in_beams = closest.quickest() == BEAM && !places.iter().any(packets_were_quicker);
-        if !is_lot(accel, closest, rays) || !in_beams {
-            return Self::squares(closest, accel, places, rays, active, hits);
+        let in_beams = closest.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
+        if !lot.is_chosen_for(accel, closest) || !in_beams {
+            return Self::squares(closest, accel, lot);
         }
-        let taken = timed(accel, &LOT_WAYS, lots, None, count(active), |kernel| match kernel {
-            Kernel::WideTile => accel.intersect_tile(rays, active, hits),
-            _ => Self::squares(closest, accel, places, rays, active, hits),
+        let taken = timed(accel, &LOT_WAYS, lots, None, lot.count(), |kernel| match kernel {
+            Kernel::WideTile => accel.intersect_tile(lot.rays, lot.active, lot.answers),
+            _ => Self::squares(closest, accel, lot),
         });
         if let Some((WIDE, cost)) = taken {
             closest.pass(cost);
@@ -137,16 +130,9 @@ impl Dispatch {
     }
 
     /// The same, square by square.
-    fn squares(
-        choice: &mut Choice<{ WAYS.len() }>,
-        accel: &Accel,
-        places: &[Place<'_>],
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        hits: &mut [HitPacket<16>],
-    ) {
-        let places = places.iter().map(|place| place.closest);
-        by_squares(choice, accel, places, rays, active, hits, |kernel, rays, active, hits| match kernel {
+    fn squares(choice: &mut Choice<{ WAYS.len() }>, accel: &Accel, lot: Asked<'_, '_, HitPacket<16>>) {
+        let places = lot.places.iter().map(|place| place.closest);
+        by_squares(choice, accel, places, lot, |kernel, rays, active, hits| match kernel {
             Kernel::Tile => accel.intersect_tile(rays, active, hits),
             Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
             _ => accel.intersect_packets(rays, active, hits),
@@ -165,17 +151,19 @@ impl Dispatch {
         leave_out_halves(accel, &WAYS, &mut self.any);
         // Longer lists are quicker than short ones. Where all lots are thought to go as lists, they are one.
         let Self { any_lots, any, .. } = self;
-        let (lots, count) = (rays.len().div_ceil(LOT), count(active));
-        let in_lists = lots > 1 && is_lot(accel, any, rays) && go_as_lists(any_lots) && count >= LEAST_RAYS;
+        let field = Asked { places, rays, active, answers: occluded };
+        let (lots, count) = (rays.len().div_ceil(LOT), field.count());
+        let may_be_one = lots > 1 && field.is_chosen_for(accel, any) && count >= LEAST_RAYS;
+        let in_lists = may_be_one && go_as_lists(any_lots);
         if in_lists && any_lots.settles_on(LISTS, lots) {
-            let trace = || accel.occluded_lists(rays, active, occluded);
+            let trace = || accel.occluded_lists(rays, active, field.answers);
             if let Some(cost) = recorded(accel, any_lots, LISTS, count, trace) {
                 self.passed_as_lists(cost);
             }
             return;
         }
-        for (places, rays, active, occluded) in lots_of(places, rays, active, occluded) {
-            self.occluded_lot(accel, places, rays, active, occluded);
+        for lot in field.lots() {
+            self.occluded_lot(accel, lot);
         }
     }
 
@@ -186,26 +174,19 @@ impl Dispatch {
     }
 
     /// The same for one lot.
-    fn occluded_lot(
-        &mut self,
-        accel: &Accel,
-        places: &[Place<'_>],
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        occluded: &mut [u32],
-    ) {
+    fn occluded_lot(&mut self, accel: &Accel, lot: Asked<'_, '_, u32>) {
         let Self { any_lots, any, least_by_lists, .. } = self;
         // Where beams are quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
         // through little are not worth a list's trouble, which costs something even where they meet nothing.
         let is_cheap = any_lots.quickest() != LISTS && least_by_lists.is_some_and(|least| any.last() < least);
         let in_beams = any.quickest() == BEAM && !go_as_lists(any_lots);
-        if !is_lot(accel, any, rays) || in_beams || is_cheap {
-            Self::occluded_squares(any, accel, places, rays, active, occluded);
+        if !lot.is_chosen_for(accel, any) || in_beams || is_cheap {
+            Self::occluded_squares(any, accel, lot);
             return any_lots.pass(any.last());
         }
-        let taken = timed(accel, &ANY_LOT_WAYS, any_lots, None, count(active), |kernel| match kernel {
-            Kernel::Filter => accel.occluded_lists(rays, active, occluded),
-            _ => Self::occluded_squares(any, accel, places, rays, active, occluded),
+        let taken = timed(accel, &ANY_LOT_WAYS, any_lots, None, lot.count(), |kernel| match kernel {
+            Kernel::Filter => accel.occluded_lists(lot.rays, lot.active, lot.answers),
+            _ => Self::occluded_squares(any, accel, lot),
         });
         if let Some((LISTS, cost)) = taken {
             self.passed_as_lists(cost);
@@ -213,28 +194,13 @@ impl Dispatch {
     }
 
     /// The same, square by square.
-    fn occluded_squares(
-        choice: &mut Choice<{ WAYS.len() }>,
-        accel: &Accel,
-        places: &[Place<'_>],
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        occluded: &mut [u32],
-    ) {
-        let places = places.iter().map(|place| place.any);
-        by_squares(
-            choice,
-            accel,
-            places,
-            rays,
-            active,
-            occluded,
-            |kernel, rays, active, found| match kernel {
-                Kernel::Tile => accel.occluded_tile(rays, active, found),
-                Kernel::Packet8 => accel.occluded_halves(rays, active, found),
-                _ => accel.occluded_packets(rays, active, found),
-            },
-        );
+    fn occluded_squares(choice: &mut Choice<{ WAYS.len() }>, accel: &Accel, lot: Asked<'_, '_, u32>) {
+        let places = lot.places.iter().map(|place| place.any);
+        by_squares(choice, accel, places, lot, |kernel, rays, active, found| match kernel {
+            Kernel::Tile => accel.occluded_tile(rays, active, found),
+            Kernel::Packet8 => accel.occluded_halves(rays, active, found),
+            _ => accel.occluded_packets(rays, active, found),
+        });
     }
 
     /// The kernels that are thought to be quickest at the moment: for closest hits, and for any hit.
@@ -250,16 +216,36 @@ impl Dispatch {
     }
 }
 
-/// Lots of packets one after the other, each with what is known of its places, which may be less than all, and the room for its answers.
-fn lots_of<'a, 'p, A>(
+/// Packets that something is asked of: a field, a lot, or less.
+struct Asked<'a, 'p, A> {
+    /// What is known of the places of their squares, which may be less than all.
     places: &'a [Place<'p>],
     rays: &'a [RayPacket<16>],
+    /// A bit for each lane in which there is a ray.
     active: &'a [u32],
+    /// The room for what they answer.
     answers: &'a mut [A],
-) -> impl Iterator<Item = (&'a [Place<'p>], &'a [RayPacket<16>], &'a [u32], &'a mut [A])> {
-    let places = places.chunks(LOT / PACKETS).chain(std::iter::repeat(&[] as &[_]));
-    let lots = rays.chunks(LOT).zip(active.chunks(LOT)).zip(answers.chunks_mut(LOT)).zip(places);
-    lots.map(|(((rays, active), answers), places)| (places, rays, active, answers))
+}
+
+impl<'a, 'p, A> Asked<'a, 'p, A> {
+    /// Its lots, one after the other.
+    fn lots(self) -> impl Iterator<Item = Self> {
+        let Self { places, rays, active, answers } = self;
+        let places = places.chunks(LOT / PACKETS).chain(std::iter::repeat(&[] as &[_]));
+        let lots = rays.chunks(LOT).zip(active.chunks(LOT)).zip(answers.chunks_mut(LOT)).zip(places);
+        lots.map(|(((rays, active), answers), places)| Self { places, rays, active, answers })
+    }
+
+    /// The number of rays.
+    fn count(&self) -> usize {
+        count(self.active)
+    }
+
+    /// Whether it is a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,
+    /// and the first squares are for getting to know the other kernels.
+    fn is_chosen_for(&self, accel: &Accel, squares: &Choice<{ WAYS.len() }>) -> bool {
+        self.rays.len() > PACKETS && accel.cached().is_none() && !squares.is_beginning()
+    }
 }
 
 /// Leaves out packets of 8 where a register holds sixteen rays. They never are the quickest there, and were tried for nothing.
@@ -282,14 +268,13 @@ fn by_squares<'a, A>(
     choice: &mut Choice<{ WAYS.len() }>,
     accel: &Accel,
     places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>> + Clone,
-    rays: &[RayPacket<16>],
-    active: &[u32],
-    answers: &mut [A],
+    lot: Asked<'_, '_, A>,
     trace: impl Fn(Kernel, &[RayPacket<16>], &[u32], &mut [A]),
 ) {
-    let (squares, count_of_all) = (rays.len().div_ceil(PACKETS), count(active));
-    let may_go_together = is_lot(accel, choice, rays) && count_of_all >= LEAST_RAYS;
+    let (squares, count_of_all) = (lot.rays.len().div_ceil(PACKETS), lot.count());
+    let may_go_together = lot.is_chosen_for(accel, choice) && count_of_all >= LEAST_RAYS;
     let together = if may_go_together { way_of_all(choice, places.clone(), squares) } else { None };
+    let Asked { rays, active, answers, .. } = lot;
     let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
     if let Some(way) = together {
         let trace_all =
@@ -315,12 +300,6 @@ fn way_of_all<'a>(
     }
     let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
     (places.flatten().all(go_best) && choice.settles_there()).then_some(BEAM)
-}
-
-/// Whether packets are a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,
-/// and the first squares are for getting to know the other kernels.
-fn is_lot(accel: &Accel, squares: &Choice<{ WAYS.len() }>, rays: &[RayPacket<16>]) -> bool {
-    rays.len() > PACKETS && accel.cached().is_none() && !squares.is_beginning()
 }
 
 /// Has a kernel trace so many rays of a place, and takes note of how long that took. Gives the way, and the logarithm of the
