@@ -160,7 +160,7 @@ impl<const W: usize> HitPacket<W> {
 
     /// Puts a hit into a lane. Panics if there is no such lane.
     #[inline(always)]
-    fn set(&mut self, lane: usize, hit: &Hit) {
+    pub(super) fn set(&mut self, lane: usize, hit: &Hit) {
         self.t[lane] = hit.t;
         self.u[lane] = hit.u;
         self.v[lane] = hit.v;

@@ -12,7 +12,8 @@ type Call<const W: usize, A> = fn(&mut Dispatch, &Accel, &[Place<'_>], &[RayPack
 pub struct Calls<const W: usize> {
     /// Side of the square of pixels whose packets come at once: [`SQUARE`] or [`LOT`].
     pub side: u32,
-    /// So many such squares, to the right and down, have their shadow rays traced at once: 1 or [`LOTS`].
+    /// So many such squares, to the right and down, have their shadow rays traced at once, and camera rays that go as lists: 1 or
+    /// [`LOTS`].
     pub lots: u32,
     /// The closest hits of the lanes given with each packet.
     pub intersect: Call<W, HitPacket<W>>,
@@ -106,6 +107,6 @@ impl Calls<16> {
     pub const TILES: Self =
         Self { side: SQUARE, lots: 1, intersect: Dispatch::intersect, occluded: Dispatch::occluded };
 
-    /// All rays of a lot, likewise, and shadow rays of more than one.
+    /// All rays of a lot, likewise, and shadow rays and lists of more than one.
     pub const LOTS: Self = Self { side: LOT, lots: LOTS, ..Self::TILES };
 }

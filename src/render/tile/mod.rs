@@ -26,7 +26,7 @@ pub(super) const SQUARE: u32 = 16;
 /// Side of a lot of such squares, which wide beams take at once.
 const LOT: u32 = 2 * SQUARE;
 
-/// So many lots beside one another, and as many below, make a field, whose shadow rays go at once.
+/// So many lots beside one another, and as many below, make a field, whose shadow rays go at once, and camera rays where they go as lists.
 const LOTS: u32 = 2;
 
 /// Lots in a field.
@@ -81,7 +81,7 @@ pub(super) struct Scratch<const W: usize> {
     blocks: Vec<Block>,
     /// A bit for each lane whose pixel is in the tile.
     active: Vec<u32>,
-    /// Camera rays of a square or a lot, and what they hit.
+    /// Camera rays of what goes at once, a square, a lot or a field, and what they hit.
     rays: Vec<RayPacket<W>>,
     hits: Vec<HitPacket<W>>,
     /// What one packet after the other hit.
@@ -107,13 +107,12 @@ impl<const W: usize> Scratch<W> {
     /// Empty, with what has been learnt before about kernels, and room for so many squares of pixels, to the right and down, of such a
     /// side.
     pub fn new(dispatch: Dispatch, side: u32, lots: u32) -> Self {
-        let of_lot = (side * side) as usize / W;
-        let count = (lots * lots) as usize * of_lot;
+        let count = (lots * lots * side * side) as usize / W;
         Self {
             blocks: vec![Block { x: 0, y: 0 }; count],
             active: vec![0; count],
-            rays: vec![RayPacket::empty(); of_lot],
-            hits: vec![HitPacket::miss(); of_lot],
+            rays: vec![RayPacket::empty(); count],
+            hits: vec![HitPacket::miss(); count],
             found: Found::nothing(),
             shades: vec![Shades::black(); count],
             lit: vec![0; count],
@@ -219,9 +218,15 @@ where
         self.write(scratch, used, pixels);
     }
 
-    /// Takes one sample of each pixel: camera rays and shading, lot by lot, and shadow rays.
+    /// Takes one sample of each pixel: camera rays and shading, lot by lot or, where they go as lists, all at once; and shadow rays.
     fn sample(&self, scratch: &mut Scratch<W>, field: &Field<'_>, sample: u32, pixels: &mut TilePixels<'_>) {
-        for (part, places) in field.parts.iter().zip(field.places) {
+        // At the edge of a tile lots are smaller, and a field is none.
+        let all = 0..field.used;
+        let is_whole = all.len() == field.parts.len() * SQUARES * BATCH / W;
+        let parts = |at_once| if at_once { std::slice::from_ref(&all) } else { field.parts };
+
+        let mut places = field.places.as_flattened();
+        for part in parts(is_whole && scratch.dispatch.looks_in_lists()) {
             let start = Stopwatch::start(self.accel);
             let active = &scratch.active[part.clone()];
             self.make_rays(&scratch.blocks[part.clone()], &mut scratch.rays, &pixels.tile, subpixel(sample));
@@ -229,6 +234,7 @@ where
             (self.calls.intersect)(&mut scratch.dispatch, self.accel, places, rays, active, hits);
             scratch.camera.rays += count(active);
             scratch.camera.time += start.elapsed(self.accel);
+            places = places.get(SQUARES..).unwrap_or_default();
 
             let surfaces = self.shader.reader();
             for packet in 0..part.len() {
@@ -236,11 +242,8 @@ where
             }
         }
 
-        // At the edge of a tile lots are smaller, and a field is none.
-        let all = 0..field.used;
-        let is_whole = all.len() == field.parts.len() * SQUARES * BATCH / W;
-        let parts = if is_whole { std::slice::from_ref(&all) } else { field.parts };
         let mut places = field.places.as_flattened();
+        let parts = parts(is_whole);
         for part in parts {
             let start = Stopwatch::start(self.accel);
             let lit = &scratch.lit[part.clone()];
@@ -258,18 +261,18 @@ where
         self.accel.chosen().run(CameraRays { view: &self.view, blocks, rays, tile, offset });
     }
 
-    /// Shades a packet's hits, by its numbers in the lot and at all, and makes its shadow rays. The first sample also fills the depth and
+    /// Shades a packet's hits, by its numbers in what went at once and at all, and makes its shadow rays. The first sample also fills the depth and
     /// normal pictures.
     fn shade(
         &self,
         scratch: &mut Scratch<W>,
         surfaces: &impl Look,
-        (of_lot, packet): (usize, usize),
+        (at_once, packet): (usize, usize),
         first: bool,
         pixels: &mut TilePixels<'_>,
     ) {
         let (block, shades) = (scratch.blocks[packet], &mut scratch.shades[packet]);
-        let (rays, hits, active) = (&scratch.rays[of_lot], &scratch.hits[of_lot], scratch.active[packet]);
+        let (rays, hits, active) = (&scratch.rays[at_once], &scratch.hits[at_once], scratch.active[packet]);
         let out = (&mut scratch.found, &mut *shades, &mut scratch.shadows[packet]);
         self.shader.shade(self.accel.chosen(), surfaces, (rays, hits, active), out);
         scratch.lit[packet] = shades.lit;

@@ -138,7 +138,7 @@ impl Ours {
         let shared = Arc::clone(&learnt);
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             let mut dispatch = shared.take();
-            for ((packets, lanes), out) in rays.tiles(LOT).zip(hits.chunks_mut(LOT)) {
+            for ((packets, lanes), out) in rays.tiles(FIELD).zip(hits.chunks_mut(FIELD)) {
                 dispatch.intersect(accel, &[], packets, lanes, out);
             }
             shared.put(dispatch);
@@ -275,9 +275,8 @@ pub const MIXED: &str = "mixed";
 /// Packets in a tile.
 const TILE: usize = 16;
 
-/// Packets that a choice is made for at once, of rays that look for the closest hit, and of rays that ask for any hit.
-const LOT: usize = 64;
-const FIELD: usize = 4 * LOT;
+/// Packets that a choice is made for at once: 64 x 64 rays.
+const FIELD: usize = 256;
 
 /// Packets of `W`, all full but perhaps the last.
 struct Packets<const W: usize> {

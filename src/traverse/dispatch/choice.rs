@@ -277,7 +277,21 @@ impl<const WAYS: usize> Choice<WAYS> {
         if let Some(way) = self.everywhere {
             return way;
         }
-        self.kinds[self.nearest_known(self.here).unwrap_or(self.here)].quickest()
+        self.kind_here().quickest()
+    }
+
+    /// How much longer than by the way that is quickest in the kind of place that the next lot is in it takes by the next best, as a
+    /// logarithm (base 2).
+    pub fn lead(&self) -> f32 {
+        let Kind { cost, .. } = self.kind_here();
+        let best = smallest(cost);
+        let others = (0..WAYS).filter(|&way| way != best).map(|way| cost[way]);
+        others.fold(f32::INFINITY, f32::min) - cost[best]
+    }
+
+    /// The kind of place that the next lot is in, as far as it is known.
+    fn kind_here(&self) -> &Kind<WAYS> {
+        &self.kinds[self.nearest_known(self.here).unwrap_or(self.here)]
     }
 
     /// Says what a lot's rays took, logarithm of nanoseconds each, that were traced some other way: the next lot is thought to
@@ -359,7 +373,7 @@ impl<const WAYS: usize> Choice<WAYS> {
 
 impl<const WAYS: usize> Kind<WAYS> {
     fn quickest(&self) -> usize {
-        (0..WAYS).min_by(|&a, &b| self.cost[a].total_cmp(&self.cost[b])).unwrap_or(0)
+        smallest(&self.cost)
     }
 
     /// Lots until a way is to be tried again.

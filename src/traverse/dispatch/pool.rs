@@ -37,8 +37,9 @@ mod tests {
         assert_eq!(said(pool.take()), ignorant, "nobody has learnt anything");
 
         let mut learned = Dispatch::default();
-        let way = learned.any.next();
-        learned.any.record(way, 256, Duration::from_micros(20));
+        let squares = &mut learned.any.beams.squares;
+        let way = squares.next();
+        squares.record(way, 256, Duration::from_micros(20));
         assert_ne!(said(learned), ignorant);
         pool.put(learned);
         assert_eq!(said(pool.take()), said(learned));

@@ -38,7 +38,7 @@ fn lots_of_any_size_are_answered_as_their_packets_are() {
         let at: Vec<Place<'_>> = (0..lot % 17).map(|square| places.at(square)).collect();
         check(&mut dispatch, &accel, &at, lot, [64, 256, 16, 37, 150, 1][lot % 6]);
     }
-    assert!(!dispatch.closest.is_beginning() && !dispatch.any.is_beginning());
+    assert!(!dispatch.closest.beams.squares.is_beginning() && !dispatch.any.beams.squares.is_beginning());
 }
 
 /// Has a choice learn that a way is far quicker than the others.
@@ -50,19 +50,59 @@ fn teach<const N: usize>(choice: &mut Choice<N>, quick: usize) {
     assert_eq!(choice.quickest(), quick);
 }
 
+/// Has a dispatch learn which ways are quickest.
+fn teach_all(dispatch: &mut Dispatch, lists: usize, wide: usize, square: usize) {
+    for Learnt { lists: of_lists, beams, .. } in [&mut dispatch.closest, &mut dispatch.any] {
+        teach(of_lists, lists);
+        teach(&mut beams.wide, wide);
+        teach(&mut beams.squares, square);
+    }
+}
+
 #[test]
 fn lots_of_any_size_are_answered_likewise_whatever_is_quickest() {
-    let accel = soup();
-    for way in 0..WAYS.len() {
-        for lots in 0..2 {
-            let mut dispatch = Dispatch::default();
-            teach(&mut dispatch.closest, way);
-            teach(&mut dispatch.any, way);
-            teach(&mut dispatch.lots, lots);
-            teach(&mut dispatch.any_lots, lots);
-            for (lot, count) in [256, 150, 64, 37, 16, 1].into_iter().enumerate() {
-                check(&mut dispatch, &accel, &[], lot, count);
+    let pooled = soup();
+    pooled.make_pools().expect("a soup has pools");
+    for accel in [soup(), pooled] {
+        for square in 0..WAYS.len() {
+            for (lists, wide) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let mut dispatch = Dispatch::default();
+                teach_all(&mut dispatch, lists, wide, square);
+                for (lot, count) in [256, 150, 64, 37, 16, 1].into_iter().enumerate() {
+                    check(&mut dispatch, &accel, &[], lot, count);
+                }
             }
         }
     }
+}
+
+#[test]
+fn the_quickest_kernel_is_named() {
+    let named = |lists, wide, square| {
+        let mut dispatch = Dispatch::default();
+        teach_all(&mut dispatch, lists, wide, square);
+        dispatch.quickest()
+    };
+    assert_eq!(named(0, 1, 1), [Kernel::Filter; 2]);
+    assert_eq!(named(1, 1, 0), [Kernel::Tile; 2]);
+    assert_eq!(named(1, 0, 1), [Kernel::Packet16; 2]);
+    assert_eq!(named(1, 0, 0)[0], Kernel::WideTile);
+}
+
+/// Lists go through what has been made for them: through the tree, closest hits are looked for without them.
+#[test]
+fn closest_hits_are_looked_for_in_lists_through_pools_alone() {
+    let lists_taken = |accel: &Accel| {
+        let mut dispatch = Dispatch::default();
+        // Packets are quicker than beams, or lists would not be thought of.
+        teach(&mut dispatch.closest.beams.squares, 1);
+        for lot in 0..40 {
+            check(&mut dispatch, accel, &[], lot, 64);
+        }
+        dispatch.closest.have_gone_as_lists
+    };
+    let accel = soup();
+    assert!(!lists_taken(&accel));
+    accel.make_pools().expect("a soup has pools");
+    assert!(lists_taken(&accel));
 }

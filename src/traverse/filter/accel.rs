@@ -1,28 +1,38 @@
 //! Lists of rays through an [`Accel`].
 
+use super::answers::{BySixteens, Found, Hits};
 use super::ground::{OfBoxes, OfLines};
-use super::{BySixteens, trace};
+use super::trace;
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::Pools;
 use crate::simd::Simd;
-use crate::traverse::pool::answers::Told;
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
 use crate::traverse::source::Source;
-use crate::traverse::stream::{Answers, Any, Closest};
-use crate::traverse::{Accel, RayPacket};
+use crate::traverse::{Accel, HitPacket, RayPacket};
 
 impl Accel {
     /// The closest hit of each ray, by lists of rays.
     pub(in crate::traverse) fn intersect_filtered(&self, rays: &[Ray], hits: &mut [Hit]) {
-        self.ask_lists(Source::Slice(rays), Closest(hits));
+        self.ask_lists(Source::Slice(rays), Hits::Rays(hits));
     }
 
     /// Whether anything lies in each ray's interval, likewise.
     pub(in crate::traverse) fn occluded_filtered(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.ask_lists(Source::Slice(rays), Found::Rays(occluded));
+    }
+
+    /// The closest hits of the lanes whose bit is set in `active`, packet by packet; the others come out as misses.
+    pub(in crate::traverse) fn intersect_lists(
+        &self,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [HitPacket<16>],
+    ) {
+        assert!(rays.len() == active.len() && rays.len() == hits.len(), "as many lanes as packets");
+        self.ask_lists(Source::Packets(rays, active), Hits::Lanes(hits));
     }
 
     /// A bit for each lane set in `active` in whose interval anything lies, packet by packet.
@@ -68,51 +78,5 @@ impl<A: BySixteens> ResidentQuery for InBoxes<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
         trace::<S, M, _, A>(tree, &OfBoxes(Ways::new(self.pools)), self.rays, &mut self.answers);
-    }
-}
-
-/// Whether rays hit anything.
-enum Found<'a> {
-    /// One by one.
-    Rays(&'a mut [bool]),
-    /// Sixteen by sixteen, a bit for each; none is set beforehand.
-    Lanes(&'a mut [u32]),
-}
-
-impl Answers for Found<'_> {
-    const ANY: bool = true;
-
-    #[cold]
-    #[inline(never)]
-    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
-        let mut found = [false];
-        Any(&mut found).odd::<M>(tree, 0, ray);
-        if found[0] {
-            self.hits(number);
-        }
-    }
-}
-
-impl Told for Found<'_> {
-    #[inline(always)]
-    fn hits(&mut self, ray: usize) {
-        match self {
-            Self::Rays(rays) => rays[ray] = true,
-            Self::Lanes(lanes) => lanes[ray / 16] |= 1 << (ray % 16),
-        }
-    }
-}
-
-impl BySixteens for Found<'_> {
-    #[inline(always)]
-    fn give(&mut self, sixteen: usize, done: u32) {
-        match self {
-            Self::Rays(rays) => {
-                for (lane, ray) in rays[16 * sixteen..].iter_mut().take(16).enumerate() {
-                    *ray = done >> lane & 1 == 1;
-                }
-            }
-            Self::Lanes(lanes) => lanes[sixteen] |= done,
-        }
     }
 }

@@ -26,6 +26,7 @@
 //! ordinary (`range.rs`) are left to the packet kernel.
 
 mod accel;
+mod answers;
 mod boxes;
 mod candidates;
 mod cut;
@@ -36,14 +37,13 @@ mod lot;
 mod pool;
 
 use super::closest::NONE;
-use super::pool::answers::{Pairs, Told};
+use super::pool::answers::Pairs;
 use super::records::Resident;
 use super::source::Source;
-use super::stream;
-use crate::geometry::Hit;
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
 use crate::simd::Simd;
+use answers::BySixteens;
 use candidates::Candidates;
 use ground::{Ground, Rays};
 use lists::{Entries, Heads};
@@ -51,22 +51,6 @@ use lot::{LOT, Lot};
 use pool::Seen;
 use std::cell::Cell;
 use std::ops::Range;
-
-/// What is asked of each ray, sixteen answers at a time.
-pub trait BySixteens: Told {
-    /// Gives the answers of the rays in the places from number `16 * sixteen` on, as far as they are known: which of them are done.
-    /// Closest hits are told afterwards.
-    fn give(&mut self, sixteen: usize, done: u32);
-}
-
-impl BySixteens for stream::Closest<'_> {
-    #[inline(always)]
-    fn give(&mut self, sixteen: usize, _: u32) {
-        for hit in self.0[16 * sixteen..].iter_mut().take(16) {
-            *hit = Hit::MISS;
-        }
-    }
-}
 
 /// What a worker's lots need, too large to be made anew for each call.
 struct Room {

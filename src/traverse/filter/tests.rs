@@ -10,7 +10,7 @@ use crate::mesh::generate::shapes;
 use crate::simd::{Chosen, Isa, Simd, TAGS, Task};
 use crate::traverse::pool::ways::Ways;
 use crate::traverse::source::Source;
-use crate::traverse::{Accel, Kernel, RayPacket};
+use crate::traverse::{Accel, HitPacket, Kernel, RayPacket};
 use glam::Vec3;
 use std::collections::HashSet;
 use std::ops::Range;
@@ -312,6 +312,15 @@ fn lanes_of_packets_are_answered_as_alone_and_no_others() {
             assert!(occluded.iter().all(|lanes| lanes >> 16 == 0));
             let found: u32 = occluded.iter().map(|lanes| lanes.count_ones()).sum();
             assert!((100..2000).contains(&found), "{found} of {} rays", rays.len());
+
+            let of_another = HitPacket::of_hit(&Hit { t: 0.0, primitive: 7, ..Hit::MISS });
+            let mut hits = vec![HitPacket::miss(); packets.len()];
+            hits.iter_mut().for_each(|hits| hits.set_part(3, &of_another, 1));
+            accel.intersect_lists(&packets, &active, &mut hits);
+            for (i, ray) in rays.iter().enumerate() {
+                let expected = if is_active(i) { accel.intersect(ray) } else { Hit::MISS };
+                assert_eq!(hits[i / 16].get(i % 16), expected, "ray {i} on {isa}, {accuracy}");
+            }
         }
     }
 }

@@ -197,6 +197,65 @@ pub trait OfFlights: Told + OneByOne {
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>);
 }
 
+/// Closest hits that are looked for, a place for each ray's.
+pub trait Sought {
+    /// Takes a hit for the ray in a place, if it is [nearer](is_nearer) than what that had.
+    fn offer(&mut self, place: usize, hit: &Hit);
+}
+
+/// Whether a hit counts in place of what was had, given by `t` and id: it is nearer, or as near and of a lower id.
+#[inline(always)]
+pub fn is_nearer(hit: &Hit, t: f32, primitive: u32) -> bool {
+    hit.t < t || hit.t == t && hit.primitive < primitive
+}
+
+/// [`Told::tell`] where closest hits are looked for.
+#[inline(always)]
+pub fn tell_hits<S: Simd, M: Mode>(
+    sought: &mut impl Sought,
+    tree: &Resident<'_, M::Record>,
+    rays: Source<'_>,
+    pairs: &Pairs,
+    count: usize,
+    Met16 { own, corners: [a, b, c] }: &Met16<S::F16>,
+) {
+    let corners = [
+        [a[0].store(), a[1].store(), a[2].store()],
+        [b[0].store(), b[1].store(), b[2].store()],
+        [c[0].store(), c[1].store(), c[2].store()],
+    ];
+    let [x, y, z] = triangle::normals(&corners);
+    let zero = S::F16::splat(0.0);
+    // A zero is given out without a sign.
+    let numbers = S::F16::fours(&[own.t + zero, own.u + zero, own.v + zero, zero]);
+    let present = (1 << count) - 1;
+    let mut hits = own.hits & present;
+    while hits != 0 {
+        let lane = hits.trailing_zeros() as usize % 16;
+        hits &= hits - 1;
+        let [t, u, v, _] = numbers[lane];
+        let (primitive, normal) = (pairs.primitives[lane] as u32, [x[lane], y[lane], z[lane]].into());
+        sought.offer(pairs.rays[lane] as usize, &Hit { t, u, v, primitive, normal });
+    }
+    let mut open = own.open & present;
+    while open != 0 {
+        let lane = open.trailing_zeros() as usize % 16;
+        open &= open - 1;
+        let ray = pairs.rays[lane] as usize;
+        sought.offer(ray, &hit_of_one::<M>(tree, &rays.ray(ray), pairs.primitives[lane] as u32));
+    }
+}
+
+impl Sought for Closest<'_> {
+    #[inline(always)]
+    fn offer(&mut self, place: usize, hit: &Hit) {
+        let had = &mut self.0[place];
+        if is_nearer(hit, had.t, had.primitive) {
+            *had = *hit;
+        }
+    }
+}
+
 impl Told for Closest<'_> {
     #[inline(always)]
     fn hits(&mut self, _ray: usize) {}
@@ -208,36 +267,9 @@ impl Told for Closest<'_> {
         rays: Source<'_>,
         pairs: &Pairs,
         count: usize,
-        Met16 { own, corners: [a, b, c] }: &Met16<S::F16>,
+        found: &Met16<S::F16>,
     ) {
-        let corners = [
-            [a[0].store(), a[1].store(), a[2].store()],
-            [b[0].store(), b[1].store(), b[2].store()],
-            [c[0].store(), c[1].store(), c[2].store()],
-        ];
-        let [x, y, z] = triangle::normals(&corners);
-        let zero = S::F16::splat(0.0);
-        // A zero is given out without a sign.
-        let numbers = S::F16::fours(&[own.t + zero, own.u + zero, own.v + zero, zero]);
-        let present = (1 << count) - 1;
-        let mut hits = own.hits & present;
-        while hits != 0 {
-            let lane = hits.trailing_zeros() as usize % 16;
-            hits &= hits - 1;
-            let [t, u, v, _] = numbers[lane];
-            let (primitive, normal) = (pairs.primitives[lane] as u32, [x[lane], y[lane], z[lane]].into());
-            take_nearer(&mut self.0[pairs.rays[lane] as usize], Hit { t, u, v, primitive, normal });
-        }
-        let mut open = own.open & present;
-        while open != 0 {
-            let lane = open.trailing_zeros() as usize % 16;
-            open &= open - 1;
-            let ray = pairs.rays[lane] as usize;
-            take_nearer(
-                &mut self.0[ray],
-                hit_of_one::<M>(tree, &rays.ray(ray), pairs.primitives[lane] as u32),
-            );
-        }
+        tell_hits::<S, M>(self, tree, rays, pairs, count, found);
     }
 }
 
@@ -245,14 +277,6 @@ impl OfFlights for Closest<'_> {
     #[inline(always)]
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>) {
         self.0[ray] = nearest.map_or(Hit::MISS, |(id, candidate)| hit_of::<M>(tree, id, &candidate));
-    }
-}
-
-/// Takes a hit if it is nearer than what was had, or as near and of a lower id.
-#[inline(always)]
-fn take_nearer(had: &mut Hit, hit: Hit) {
-    if hit.t < had.t || hit.t == had.t && hit.primitive < had.primitive {
-        *had = hit;
     }
 }
 

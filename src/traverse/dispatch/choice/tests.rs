@@ -239,3 +239,15 @@ fn nothing_is_learnt_from_no_rays() {
     assert_eq!(choice.record(0, 0, Duration::from_secs(1)), None);
     assert_eq!(choice.next(), 0);
 }
+
+#[test]
+fn a_lead_is_what_sets_the_quickest_way_apart_from_the_next() {
+    for cost in [[30.0, 60.0, 45.0], [60.0, 45.0, 30.0]] {
+        let mut choice = Choice::default();
+        run(&mut choice, 2000, |_| cost);
+        assert!((choice.lead() - 1.5_f32.log2()).abs() < 0.1, "{cost:?}: {}", choice.lead());
+        // One that is left out is no other way.
+        choice.leave_out(if cost[1] == 45.0 { 1 } else { 2 });
+        assert!((choice.lead() - 1.0).abs() < 0.1, "{cost:?}: {}", choice.lead());
+    }
+}

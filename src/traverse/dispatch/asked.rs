@@ -1,0 +1,146 @@
+//! Packets, and what is asked of them.
+
+use super::{LOT, PACKETS, Place, WAYS};
+use crate::traverse::accel::Accel;
+use crate::traverse::dispatch::choice::Choice;
+use crate::traverse::dispatch::places::Costs;
+use crate::traverse::kernel::Kernel;
+use crate::traverse::lanes::{HitPacket, RayPacket};
+
+/// What can be asked of packets.
+pub trait Question {
+    /// What a packet answers.
+    type Answer;
+
+    /// Whether lists may be the quickest.
+    fn may_go_as_lists(accel: &Accel) -> bool;
+
+    /// What is known of a place.
+    fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>>;
+
+    /// Has a kernel answer it. Where that takes packets of 8, each goes as two.
+    fn trace(
+        kernel: Kernel,
+        accel: &Accel,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        answers: &mut [Self::Answer],
+    );
+}
+
+/// Which hit is the closest.
+pub struct Closest;
+
+impl Question for Closest {
+    type Answer = HitPacket<16>;
+
+    /// Through the tree they never are: camera rays take 1.35 times as long as by the best kernel, and more (`docs/coherent.md`).
+    #[inline(always)]
+    fn may_go_as_lists(accel: &Accel) -> bool {
+        accel.pools().is_some()
+    }
+
+    #[inline(always)]
+    fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>> {
+        place.closest
+    }
+
+    #[inline(always)]
+    fn trace(
+        kernel: Kernel,
+        accel: &Accel,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        hits: &mut [Self::Answer],
+    ) {
+        match kernel {
+            Kernel::Filter => accel.intersect_lists(rays, active, hits),
+            Kernel::Tile | Kernel::WideTile => accel.intersect_tile(rays, active, hits),
+            Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
+            _ => accel.intersect_packets(rays, active, hits),
+        }
+    }
+}
+
+/// Whether there is any hit.
+pub struct Any;
+
+impl Question for Any {
+    type Answer = u32;
+
+    #[inline(always)]
+    fn may_go_as_lists(_: &Accel) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>> {
+        place.any
+    }
+
+    #[inline(always)]
+    fn trace(
+        kernel: Kernel,
+        accel: &Accel,
+        rays: &[RayPacket<16>],
+        active: &[u32],
+        found: &mut [Self::Answer],
+    ) {
+        match kernel {
+            Kernel::Filter => accel.occluded_lists(rays, active, found),
+            Kernel::Tile | Kernel::WideTile => accel.occluded_tile(rays, active, found),
+            Kernel::Packet8 => accel.occluded_halves(rays, active, found),
+            _ => accel.occluded_packets(rays, active, found),
+        }
+    }
+}
+
+/// Packets that something is asked of: a field, a lot, or less.
+pub struct Asked<'a, 'p, A> {
+    /// What is known of the places of their squares, which may be less than all.
+    pub places: &'a [Place<'p>],
+    pub rays: &'a [RayPacket<16>],
+    /// A bit for each lane in which there is a ray.
+    pub active: &'a [u32],
+    /// The room for what they answer.
+    pub answers: &'a mut [A],
+}
+
+impl<'a, A> Asked<'a, '_, A> {
+    /// Its lots, one after the other.
+    pub fn lots(self) -> impl Iterator<Item = Self> {
+        let Self { places, rays, active, answers } = self;
+        let places = places.chunks(LOT / PACKETS).chain(std::iter::repeat(&[] as &[_]));
+        let lots = rays.chunks(LOT).zip(active.chunks(LOT)).zip(answers.chunks_mut(LOT)).zip(places);
+        lots.map(|(((rays, active), answers), places)| Self { places, rays, active, answers })
+    }
+
+    /// Its squares: packets, lanes and answers of each.
+    pub fn squares(self) -> impl Iterator<Item = (&'a [RayPacket<16>], &'a [u32], &'a mut [A])> {
+        let Self { rays, active, answers, .. } = self;
+        let squares = rays.chunks(PACKETS).zip(active.chunks(PACKETS)).zip(answers.chunks_mut(PACKETS));
+        squares.map(|((rays, active), answers)| (rays, active, answers))
+    }
+
+    /// The number of rays.
+    pub fn count(&self) -> usize {
+        count(self.active)
+    }
+
+    /// Whether it is a lot that is chosen for at once. A scene that is in memory in part has neither wide beams nor lists,
+    /// and the first squares are for getting to know the other kernels.
+    pub fn is_chosen_for(&self, accel: &Accel, squares: &Choice<{ WAYS.len() }>) -> bool {
+        self.rays.len() > PACKETS && accel.cached().is_none() && !squares.is_beginning()
+    }
+
+    /// Has a kernel answer it all.
+    #[inline(always)]
+    pub fn trace<Q: Question<Answer = A>>(self, accel: &Accel, kernel: Kernel) {
+        Q::trace(kernel, accel, self.rays, self.active, self.answers);
+    }
+}
+
+/// The lanes in which there are rays.
+pub fn count(active: &[u32]) -> usize {
+    active.iter().map(|lanes| lanes.count_ones() as usize).sum()
+}

@@ -1,0 +1,168 @@
+//! What was learnt about one kind of question, and what is done with it: lists, or beams; wide ones, or squares; and which kernel for
+//! each square.
+
+use super::asked::{Asked, Question, count};
+use super::choice::Choice;
+use super::places::Costs;
+use super::{
+    BEAM, BESIDE, LEAST_RAYS, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
+    leave_out_halves, recorded, timed,
+};
+use crate::traverse::accel::Accel;
+use crate::traverse::kernel::Kernel;
+
+/// Where packets take no longer than that beside beams, as a logarithm (base 2), lists are tried: they share more than packets do, and
+/// less than beams. (Chosen by replays, see `docs/coherent.md`.)
+const NEAR: f32 = 0.5;
+
+/// What was learnt about one kind of question.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Learnt {
+    pub lists: Choice<{ LISTS_OR_BEAMS.len() }>,
+    pub beams: Beams,
+    /// Whether any rays went as lists, and the logarithm of the least that a ray has taken then: but for the first lot, which finds
+    /// nothing made ready, takes ten times as long as others, and would have all that is to come look cheap.
+    pub have_gone_as_lists: bool,
+    least_by_lists: Option<f32>,
+}
+
+/// The same about what is done where rays do not go as lists.
+#[derive(Clone, Copy, Debug)]
+pub struct Beams {
+    pub wide: Choice<{ WIDE_OR_SQUARES.len() }>,
+    pub squares: Choice<{ WAYS.len() }>,
+}
+
+impl Default for Beams {
+    fn default() -> Self {
+        Self { wide: Choice::of_all_places(BESIDE), squares: Choice::default() }
+    }
+}
+
+impl Learnt {
+    /// Has packets traced, of which more than a lot may go as one list: longer ones are quicker.
+    pub fn field<Q: Question>(&mut self, accel: &Accel, field: Asked<'_, '_, Q::Answer>) {
+        leave_out_halves(accel, &WAYS, &mut self.beams.squares);
+        let (lots, count) = (field.rays.len().div_ceil(LOT), field.count());
+        let may_be_one = lots > 1 && field.is_chosen_for(accel, &self.beams.squares) && count >= LEAST_RAYS;
+        if may_be_one && self.go_as_lists() && self.lists.settles_on(LISTS, lots) {
+            let trace = || field.trace::<Q>(accel, Kernel::Filter);
+            if let Some(cost) = recorded(accel, &mut self.lists, LISTS, count, trace) {
+                self.passed_as_lists(cost);
+            }
+            return;
+        }
+        for lot in field.lots() {
+            self.lot::<Q>(accel, lot);
+        }
+    }
+
+    /// The same for one lot.
+    fn lot<Q: Question>(&mut self, accel: &Accel, lot: Asked<'_, '_, Q::Answer>) {
+        let go_as_lists = self.go_as_lists();
+        let Self { lists, beams, least_by_lists, .. } = self;
+        let squares = &beams.squares;
+        if !Q::may_go_as_lists(accel) || !lot.is_chosen_for(accel, squares) {
+            return beams.lot::<Q>(accel, lot);
+        }
+        // Where beams are far quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
+        // through little are not worth a list's trouble, which costs something even where they meet nothing.
+        let is_cheap =
+            lists.quickest() != LISTS && least_by_lists.is_some_and(|least| squares.last() < least);
+        let in_beams = squares.quickest() == BEAM && squares.lead() > NEAR;
+        if is_cheap || in_beams && !go_as_lists {
+            beams.lot::<Q>(accel, lot);
+            return lists.pass(beams.squares.last());
+        }
+        let taken = timed(accel, &LISTS_OR_BEAMS, lists, None, lot.count(), |kernel| match kernel {
+            Kernel::Filter => lot.trace::<Q>(accel, kernel),
+            _ => beams.lot::<Q>(accel, lot),
+        });
+        if let Some((LISTS, cost)) = taken {
+            self.passed_as_lists(cost);
+        }
+    }
+
+    /// Takes note of what a ray took where lists did, logarithm of nanoseconds.
+    fn passed_as_lists(&mut self, cost: f32) {
+        self.beams.squares.pass(cost);
+        if self.have_gone_as_lists {
+            self.least_by_lists = Some(self.least_by_lists.map_or(cost, |least| least.min(cost)));
+        }
+        self.have_gone_as_lists = true;
+    }
+
+    /// Whether lists have turned out to be quicker for lots.
+    pub fn go_as_lists(&self) -> bool {
+        !self.lists.is_beginning() && self.lists.quickest() == LISTS
+    }
+
+    /// The kernel that is thought to be quickest at the moment.
+    pub fn quickest(&self) -> Kernel {
+        let Beams { wide, squares } = &self.beams;
+        match WAYS[squares.quickest()] {
+            _ if self.go_as_lists() => Kernel::Filter,
+            Kernel::Tile if !wide.is_beginning() && wide.quickest() == WIDE => Kernel::WideTile,
+            kernel => kernel,
+        }
+    }
+}
+
+impl Beams {
+    /// Has a lot traced, wide or square by square.
+    fn lot<Q: Question>(&mut self, accel: &Accel, lot: Asked<'_, '_, Q::Answer>) {
+        let Self { wide, squares } = self;
+        // Where packets are quicker than beams, wide ones are out of the question.
+        let packets_were_quicker =
+            |place: &Place<'_>| Q::costs(place).is_some_and(|costs| costs.is_slower(BEAM));
+        let in_beams = squares.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
+        if !lot.is_chosen_for(accel, squares) || !in_beams {
+            return by_squares::<Q>(squares, accel, lot);
+        }
+        let taken = timed(accel, &WIDE_OR_SQUARES, wide, None, lot.count(), |kernel| match kernel {
+            Kernel::WideTile => lot.trace::<Q>(accel, kernel),
+            _ => by_squares::<Q>(squares, accel, lot),
+        });
+        if let Some((WIDE, cost)) = taken {
+            squares.pass(cost);
+        }
+    }
+}
+
+/// Has packets traced square by square, each by the kernel that is quickest at its place.
+fn by_squares<Q: Question>(
+    choice: &mut Choice<{ WAYS.len() }>,
+    accel: &Accel,
+    lot: Asked<'_, '_, Q::Answer>,
+) {
+    let (count_of_squares, count_of_rays) = (lot.rays.len().div_ceil(PACKETS), lot.count());
+    let places = lot.places.iter().map(Q::costs);
+    let may_go_together = lot.is_chosen_for(accel, choice) && count_of_rays >= LEAST_RAYS;
+    let together = if may_go_together { way_of_all(choice, places.clone(), count_of_squares) } else { None };
+    let trace = |kernel, (rays, active, answers): (&[_], &[_], &mut [_])| {
+        Q::trace(kernel, accel, rays, active, answers);
+    };
+    if let Some(way) = together {
+        let trace_all = || lot.squares().for_each(|square| trace(WAYS[way], square));
+        recorded(accel, choice, way, count_of_rays, trace_all);
+        return;
+    }
+    for (square, place) in lot.squares().zip(places.chain(std::iter::repeat(None))) {
+        timed(accel, &WAYS, choice, place, count(square.1), |kernel| trace(kernel, square));
+    }
+}
+
+/// The way that all of a lot's squares go, with nothing to be learnt of any by itself: as beams, or, where there is next to nothing,
+/// whichever way.
+fn way_of_all<'a>(
+    choice: &mut Choice<{ WAYS.len() }>,
+    places: impl Iterator<Item = Option<&'a Costs<{ WAYS.len() }>>> + Clone,
+    squares: usize,
+) -> Option<usize> {
+    if places.clone().flatten().next().is_none() {
+        let way = if choice.is_cheapest() { choice.quickest() } else { BEAM };
+        return choice.settles_on(way, squares).then_some(way);
+    }
+    let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
+    (places.flatten().all(go_best) && choice.settles_there()).then_some(BEAM)
+}

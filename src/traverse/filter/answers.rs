@@ -1,0 +1,130 @@
+//! Where the answers of rays in lists go: ray by ray, or into packets.
+//!
+//! (A branch for each answer costs nothing, and a kernel for each form would have to be compiled for every instruction set and mode.)
+
+use crate::geometry::triangle::Mode;
+use crate::geometry::{Hit, Ray};
+use crate::simd::Simd;
+use crate::traverse::HitPacket;
+use crate::traverse::pool::answers::{Met16, Pairs, Sought, Told, is_nearer, tell_hits};
+use crate::traverse::records::Resident;
+use crate::traverse::source::Source;
+use crate::traverse::stream::{Answers, Any, Closest};
+
+/// What is asked of each ray, sixteen answers at a time.
+pub trait BySixteens: Told {
+    /// Gives the answers of the rays in the places from number `16 * sixteen` on, as far as they are known: which of them are done.
+    /// Closest hits are told afterwards.
+    fn give(&mut self, sixteen: usize, done: u32);
+}
+
+/// Closest hits.
+pub enum Hits<'a> {
+    /// One by one.
+    Rays(&'a mut [Hit]),
+    /// Sixteen by sixteen.
+    Lanes(&'a mut [HitPacket<16>]),
+}
+
+impl Answers for Hits<'_> {
+    const ANY: bool = false;
+
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
+        let mut found = [Hit::MISS];
+        Closest(&mut found).odd::<M>(tree, 0, ray);
+        match self {
+            Self::Rays(hits) => hits[number] = found[0],
+            Self::Lanes(hits) => hits[number / 16].set(number % 16, &found[0]),
+        }
+    }
+}
+
+impl Sought for Hits<'_> {
+    #[inline(always)]
+    fn offer(&mut self, place: usize, hit: &Hit) {
+        match self {
+            Self::Rays(hits) => Closest(hits).offer(place, hit),
+            Self::Lanes(hits) => {
+                let (hits, lane) = (&mut hits[place / 16], place % 16);
+                if is_nearer(hit, hits.t[lane], hits.primitive[lane]) {
+                    hits.set(lane, hit);
+                }
+            }
+        }
+    }
+}
+
+impl Told for Hits<'_> {
+    #[inline(always)]
+    fn hits(&mut self, _ray: usize) {}
+
+    #[inline(always)]
+    fn tell<S: Simd, M: Mode>(
+        &mut self,
+        tree: &Resident<'_, M::Record>,
+        rays: Source<'_>,
+        pairs: &Pairs,
+        count: usize,
+        found: &Met16<S::F16>,
+    ) {
+        tell_hits::<S, M>(self, tree, rays, pairs, count, found);
+    }
+}
+
+impl BySixteens for Hits<'_> {
+    #[inline(always)]
+    fn give(&mut self, sixteen: usize, _: u32) {
+        match self {
+            Self::Rays(hits) => hits[16 * sixteen..].iter_mut().take(16).for_each(|hit| *hit = Hit::MISS),
+            Self::Lanes(hits) => hits[sixteen] = HitPacket::miss(),
+        }
+    }
+}
+
+/// Whether rays hit anything.
+pub enum Found<'a> {
+    /// One by one.
+    Rays(&'a mut [bool]),
+    /// Sixteen by sixteen, a bit for each; none is set beforehand.
+    Lanes(&'a mut [u32]),
+}
+
+impl Answers for Found<'_> {
+    const ANY: bool = true;
+
+    #[cold]
+    #[inline(never)]
+    fn odd<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, number: usize, ray: &Ray) {
+        let mut found = [false];
+        Any(&mut found).odd::<M>(tree, 0, ray);
+        if found[0] {
+            self.hits(number);
+        }
+    }
+}
+
+impl Told for Found<'_> {
+    #[inline(always)]
+    fn hits(&mut self, ray: usize) {
+        match self {
+            Self::Rays(rays) => rays[ray] = true,
+            Self::Lanes(lanes) => lanes[ray / 16] |= 1 << (ray % 16),
+        }
+    }
+}
+
+impl BySixteens for Found<'_> {
+    #[inline(always)]
+    fn give(&mut self, sixteen: usize, done: u32) {
+        match self {
+            Self::Rays(rays) => {
+                for (lane, ray) in rays[16 * sixteen..].iter_mut().take(16).enumerate() {
+                    *ray = done >> lane & 1 == 1;
+                }
+            }
+            Self::Lanes(lanes) => lanes[sixteen] |= done,
+        }
+    }
+}
