@@ -11,6 +11,7 @@
 mod accuracy;
 pub mod exact;
 pub mod fast;
+mod leaving;
 mod placed;
 mod record;
 mod test;

@@ -12,6 +12,9 @@ pub trait Question {
     /// What a packet answers.
     type Answer;
 
+    /// Whether there are wide beams that answer it.
+    const HAS_WIDE_BEAMS: bool;
+
     /// Whether lists may be the quickest.
     fn may_go_as_lists(accel: &Accel) -> bool;
 
@@ -33,6 +36,8 @@ pub struct Closest;
 
 impl Question for Closest {
     type Answer = HitPacket<16>;
+
+    const HAS_WIDE_BEAMS: bool = true;
 
     /// Through the tree they never are: camera rays take 1.35 times as long as by the best kernel, and more (`docs/coherent.md`).
     #[inline(always)]
@@ -67,6 +72,8 @@ pub struct Any;
 
 impl Question for Any {
     type Answer = u32;
+
+    const HAS_WIDE_BEAMS: bool = false;
 
     #[inline(always)]
     fn may_go_as_lists(_: &Accel) -> bool {

@@ -116,7 +116,7 @@ impl Beams {
         let packets_were_quicker =
             |place: &Place<'_>| Q::costs(place).is_some_and(|costs| costs.is_slower(BEAM));
         let in_beams = squares.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
-        if !lot.is_chosen_for(accel, squares) || !in_beams {
+        if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams {
             return by_squares::<Q>(squares, accel, lot);
         }
         let taken = timed(accel, &WIDE_OR_SQUARES, wide, None, lot.count(), |kernel| match kernel {

@@ -241,7 +241,8 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
     {
         let Self { tree, rays, active, frame, ref extent, spread } = *self;
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
-        let mut bundle = Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, seen, &interval);
+        let mut bundle =
+            Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, frame.axes[2], seen, &interval);
         let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
         let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
         (bundle.open, work)

@@ -3,7 +3,7 @@
 //! Their answer is one bit. So a triangle that some ray passes through by more than an error bound, at
 //! a depth that is within the ray's interval by more than that, is enough, whatever the mode's own test
 //! would compute; and one that it misses by more is none. Only rays in doubt are put to that test, from
-//! their own origins: those that graze an edge, and those that leave or meet the triangle.
+//! their own origins: those that graze an edge, and those that meet the triangle, or start near it and do not leave it for certain.
 
 use super::beam::PACKETS;
 use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut};
@@ -29,6 +29,8 @@ where
 {
     tree: &'a T,
     rays: &'a [RayPacket<16>],
+    /// The axis along which all rays run fastest.
+    axis: usize,
     seen: &'a Seen,
     /// The lanes of each packet that have found nothing yet.
     pub open: [u32; PACKETS],
@@ -50,6 +52,7 @@ where
         tree: &'a T,
         rays: &'a [RayPacket<16>],
         active: &[u32; PACKETS],
+        axis: usize,
         seen: &'a mut Seen,
         interval: &Interval<L>,
     ) -> Self {
@@ -62,19 +65,23 @@ where
                 *part_mut(&mut seen.far[packet], part) = far.store();
             }
         }
-        Self { tree, rays, seen, open: *active, reach, types: PhantomData }
+        Self { tree, rays, axis, seen, open: *active, reach, types: PhantomData }
     }
 
-    /// The mode's own test, of the lanes in `doubtful`.
+    /// The mode's own test, of the lanes in `doubtful` that do not leave the triangle behind.
     #[inline(always)]
     fn decide(&self, packet: usize, part: usize, primitive: u32, doubtful: R::Mask) -> R::Mask {
         let rays = &self.rays[packet];
-        let test = M::Test::<N, R>::new(
-            &load_part3::<N, R>(&rays.origin, part),
-            &load_part3::<N, R>(&rays.direction, part),
-            doubtful.bits(),
-        );
-        let candidate = test.test(self.tree.record_of(primitive), doubtful);
+        let record = self.tree.record_of(primitive);
+        let origin = load_part3::<N, R>(&rays.origin, part);
+        let direction = load_part3::<N, R>(&rays.direction, part);
+        // Nearly always it is what they have just left.
+        let doubtful = doubtful & !M::leave::<N, R>(record, &origin, &direction, self.axis);
+        if !doubtful.any() {
+            return doubtful;
+        }
+        let test = M::Test::<N, R>::new(&origin, &direction, doubtful.bits());
+        let candidate = test.test(record, doubtful);
         // As a packet's closest hit is taken, which is none beyond the greatest float.
         let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
         let tnear = load_part::<N, R>(&rays.tnear, part);
