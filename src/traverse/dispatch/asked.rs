@@ -114,12 +114,16 @@ pub struct Asked<'a, 'p, A> {
 }
 
 impl<'a, A> Asked<'a, '_, A> {
-    /// Its lots, one after the other.
-    pub fn lots(self) -> impl Iterator<Item = Self> {
+    /// The first lot, and what is left.
+    pub fn first_lot(self) -> (Self, Self) {
         let Self { places, rays, active, answers } = self;
-        let places = places.chunks(LOT / PACKETS).chain(std::iter::repeat(&[] as &[_]));
-        let lots = rays.chunks(LOT).zip(active.chunks(LOT)).zip(answers.chunks_mut(LOT)).zip(places);
-        lots.map(|(((rays, active), answers), places)| Self { places, rays, active, answers })
+        let (places, places_left) = places.split_at(places.len().min(LOT / PACKETS));
+        let count = rays.len().min(LOT);
+        let (rays, rays_left) = rays.split_at(count);
+        let (active, active_left) = active.split_at(count);
+        let (answers, answers_left) = answers.split_at_mut(count);
+        let lot = Self { places, rays, active, answers };
+        (lot, Self { places: places_left, rays: rays_left, active: active_left, answers: answers_left })
     }
 
     /// Its squares: packets, lanes and answers of each.

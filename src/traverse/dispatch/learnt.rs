@@ -5,7 +5,7 @@ use super::asked::{Asked, Question, count};
 use super::choice::Choice;
 use super::places::Costs;
 use super::{
-    BEAM, BESIDE, LEAST_RAYS, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
+    BEAM, BESIDE, LEAST_RAYS, LISTS, LISTS_OR_BEAMS, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
     leave_out_halves, recorded, timed,
 };
 use crate::traverse::accel::Accel;
@@ -40,47 +40,54 @@ impl Default for Beams {
 }
 
 impl Learnt {
-    /// Has packets traced, of which more than a lot may go as one list: longer ones are quicker.
-    pub fn field<Q: Question>(&mut self, accel: &Accel, field: Asked<'_, '_, Q::Answer>) {
+    /// Has packets traced, lot by lot, until what is left goes as one list. Longer lists are quicker, and what they work with, which
+    /// nothing else does, is fetched for as many.
+    pub fn field<Q: Question>(&mut self, accel: &Accel, mut field: Asked<'_, '_, Q::Answer>) {
         leave_out_halves(accel, &WAYS, &mut self.beams.squares);
-        let (lots, count) = (field.rays.len().div_ceil(LOT), field.count());
-        let may_be_one = lots > 1 && field.is_chosen_for(accel, &self.beams.squares) && count >= LEAST_RAYS;
-        if may_be_one && self.go_as_lists() && self.lists.settles_on(LISTS, lots) {
-            let trace = || field.trace::<Q>(accel, Kernel::Filter);
-            if let Some(cost) = recorded(accel, &mut self.lists, LISTS, count, trace) {
-                self.passed_as_lists(cost);
+        while !field.rays.is_empty() {
+            let way = self.lists_or_beams::<Q>(accel, &field);
+            if way == Some(LISTS) {
+                let count = field.count();
+                let trace = || field.trace::<Q>(accel, Kernel::Filter);
+                if let Some(cost) = recorded(accel, &mut self.lists, LISTS, count, trace) {
+                    self.passed_as_lists(cost);
+                }
+                return;
             }
-            return;
-        }
-        for lot in field.lots() {
-            self.lot::<Q>(accel, lot);
+            let Self { lists, beams, .. } = self;
+            let (lot, rest) = field.first_lot();
+            let count = lot.count();
+            match way {
+                Some(way) if count >= LEAST_RAYS => {
+                    recorded(accel, lists, way, count, || beams.lot::<Q>(accel, lot));
+                }
+                _ => {
+                    beams.lot::<Q>(accel, lot);
+                    lists.pass(beams.squares.last());
+                }
+            }
+            field = rest;
         }
     }
 
-    /// The same for one lot.
-    fn lot<Q: Question>(&mut self, accel: &Accel, lot: Asked<'_, '_, Q::Answer>) {
+    /// Which it is for what comes next, if there is a choice.
+    fn lists_or_beams<Q: Question>(
+        &mut self,
+        accel: &Accel,
+        field: &Asked<'_, '_, Q::Answer>,
+    ) -> Option<usize> {
         let go_as_lists = self.go_as_lists();
-        let Self { lists, beams, least_by_lists, .. } = self;
-        let squares = &beams.squares;
-        if !Q::may_go_as_lists(accel) || !lot.is_chosen_for(accel, squares) {
-            return beams.lot::<Q>(accel, lot);
+        let Self { lists, beams: Beams { squares, .. }, least_by_lists, .. } = self;
+        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) || field.count() < LEAST_RAYS {
+            return None;
         }
         // Where beams are far quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
         // through little are not worth a list's trouble, which costs something even where they meet nothing.
         let is_cheap =
             lists.quickest() != LISTS && least_by_lists.is_some_and(|least| squares.last() < least);
         let in_beams = squares.quickest() == BEAM && squares.lead() > NEAR;
-        if is_cheap || in_beams && !go_as_lists {
-            beams.lot::<Q>(accel, lot);
-            return lists.pass(beams.squares.last());
-        }
-        let taken = timed(accel, &LISTS_OR_BEAMS, lists, None, lot.count(), |kernel| match kernel {
-            Kernel::Filter => lot.trace::<Q>(accel, kernel),
-            _ => beams.lot::<Q>(accel, lot),
-        });
-        if let Some((LISTS, cost)) = taken {
-            self.passed_as_lists(cost);
-        }
+        let is_settled = is_cheap || in_beams && !go_as_lists;
+        (!is_settled).then(|| lists.next())
     }
 
     /// Takes note of what a ray took where lists did, logarithm of nanoseconds.

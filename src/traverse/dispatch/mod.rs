@@ -9,7 +9,7 @@
 //!
 //! It is chosen up to three times. A *lot* of four squares may go as lists of rays; if it does not, as one wide beam, where squares go
 //! best as beams. Which is better is learnt from what lots have cost either way. If a lot does neither, each of its squares is chosen for by
-//! itself, as triangles as small as pixels want it. Where lots go as lists, up to four lots, a *field*, may be one list.
+//! itself, as triangles as small as pixels want it. Of some lots at once, a *field*, all go as one list that are left when a list's turn comes.
 //!
 //! What a choice costs counts where rays take 10 ns. So where squares go best as beams, or there is next to nothing to be met, and
 //! nothing else is to be tried, a lot's squares are timed together.
