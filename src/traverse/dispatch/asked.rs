@@ -1,6 +1,6 @@
 //! Packets, and what is asked of them.
 
-use super::{LOT, PACKETS, Place, WAYS};
+use super::{PACKETS, Place, WAYS};
 use crate::traverse::accel::Accel;
 use crate::traverse::dispatch::choice::Choice;
 use crate::traverse::dispatch::places::Costs;
@@ -114,16 +114,16 @@ pub struct Asked<'a, 'p, A> {
 }
 
 impl<'a, A> Asked<'a, '_, A> {
-    /// The first lot, and what is left.
-    pub fn first_lot(self) -> (Self, Self) {
+    /// The first `count` packets, whole squares, or as many as there are; and what is left.
+    pub fn split(self, count: usize) -> (Self, Self) {
         let Self { places, rays, active, answers } = self;
-        let (places, places_left) = places.split_at(places.len().min(LOT / PACKETS));
-        let count = rays.len().min(LOT);
+        let (places, places_left) = places.split_at(places.len().min(count / PACKETS));
+        let count = rays.len().min(count);
         let (rays, rays_left) = rays.split_at(count);
         let (active, active_left) = active.split_at(count);
         let (answers, answers_left) = answers.split_at_mut(count);
-        let lot = Self { places, rays, active, answers };
-        (lot, Self { places: places_left, rays: rays_left, active: active_left, answers: answers_left })
+        let first = Self { places, rays, active, answers };
+        (first, Self { places: places_left, rays: rays_left, active: active_left, answers: answers_left })
     }
 
     /// Its squares: packets, lanes and answers of each.

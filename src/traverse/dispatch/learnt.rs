@@ -5,7 +5,7 @@ use super::asked::{Asked, Question, count};
 use super::choice::Choice;
 use super::places::Costs;
 use super::{
-    BEAM, BESIDE, LEAST_RAYS, LISTS, LISTS_OR_BEAMS, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
+    BEAM, BESIDE, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
     leave_out_halves, recorded, timed,
 };
 use crate::traverse::accel::Accel;
@@ -40,33 +40,31 @@ impl Default for Beams {
 }
 
 impl Learnt {
-    /// Has packets traced, lot by lot, until what is left goes as one list. Longer lists are quicker, and what they work with, which
-    /// nothing else does, is fetched for as many.
+    /// Has packets traced, lot by lot, until what is left goes as one list, as far as one holds it. Longer lists are quicker, and what they
+    /// work with, which nothing else does, is fetched for as many.
     pub fn field<Q: Question>(&mut self, accel: &Accel, mut field: Asked<'_, '_, Q::Answer>) {
         leave_out_halves(accel, &WAYS, &mut self.beams.squares);
         while !field.rays.is_empty() {
             let way = self.lists_or_beams::<Q>(accel, &field);
-            if way == Some(LISTS) {
-                let count = field.count();
-                let trace = || field.trace::<Q>(accel, Kernel::Filter);
-                if let Some(cost) = recorded(accel, &mut self.lists, LISTS, count, trace) {
-                    self.passed_as_lists(cost);
-                }
-                return;
-            }
+            let (next, rest) = field.split(if way == Some(LISTS) { LIST } else { LOT });
+            field = rest;
+            let count = next.count();
             let Self { lists, beams, .. } = self;
-            let (lot, rest) = field.first_lot();
-            let count = lot.count();
             match way {
+                Some(LISTS) => {
+                    let trace = || next.trace::<Q>(accel, Kernel::Filter);
+                    if let Some(cost) = recorded(accel, lists, LISTS, count, trace) {
+                        self.passed_as_lists(cost);
+                    }
+                }
                 Some(way) if count >= LEAST_RAYS => {
-                    recorded(accel, lists, way, count, || beams.lot::<Q>(accel, lot));
+                    recorded(accel, lists, way, count, || beams.lot::<Q>(accel, next));
                 }
                 _ => {
-                    beams.lot::<Q>(accel, lot);
+                    beams.lot::<Q>(accel, next);
                     lists.pass(beams.squares.last());
                 }
             }
-            field = rest;
         }
     }
 
@@ -78,7 +76,8 @@ impl Learnt {
     ) -> Option<usize> {
         let go_as_lists = self.go_as_lists();
         let Self { lists, beams: Beams { squares, .. }, least_by_lists, .. } = self;
-        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) || field.count() < LEAST_RAYS {
+        let count = count(&field.active[..field.active.len().min(LIST)]);
+        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) || count < LEAST_RAYS {
             return None;
         }
         // Where beams are far quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run

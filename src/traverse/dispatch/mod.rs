@@ -63,6 +63,9 @@ const BESIDE: [f32; WIDE_OR_SQUARES.len()] = [0.08, 0.0];
 /// Packets of a lot. More than that are a field.
 const LOT: usize = 4 * PACKETS;
 
+/// Packets that go as one list, at most: as many as it holds.
+const LIST: usize = Kernel::Filter.width() / 16;
+
 /// What is used where memory is short. Beams need the upper tree's pages and packets the full tree's leaves:
 /// who uses both needs both in memory. On a power plant of which 16 % were in memory, packets alone read 28 %
 /// fewer blocks and were a fifth faster.
