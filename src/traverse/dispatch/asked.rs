@@ -39,7 +39,7 @@ impl Question for Closest {
 
     const HAS_WIDE_BEAMS: bool = true;
 
-    /// Through the tree they never are: camera rays take 1.35 times as long as by the best kernel, and more (`docs/coherent.md`).
+    /// Through the tree they never are: camera rays take 1.3 times as long as by the best kernel, and more (`docs/coherent.md`).
     #[inline(always)]
     fn may_go_as_lists(accel: &Accel) -> bool {
         accel.pools().is_some()
