@@ -47,8 +47,11 @@ pub(super) fn leave<const W: usize, L: Lanes<W>>(
         (height * speed).lt(zero) & terms.lt(height.abs()) & (speed.abs() * tiny).lt(height.abs());
     let is_steep = (L::splat(STEEP) * along.abs()).lt(speed.abs());
 
-    let depth = |corner: usize| (L::splat(corners[corner][axis]) - origin[axis]) * along;
-    let begins_behind = depth(0).min(depth(1)).min(depth(2)).lt(zero - along * along * tiny);
+    let mut nearest = L::splat(f32::INFINITY);
+    for corner in corners {
+        nearest = nearest.min((L::splat(corner[axis]) - origin[axis]) * along);
+    }
+    let begins_behind = nearest.lt(zero - along * along * tiny);
     is_behind & is_steep & begins_behind
 }
 

@@ -77,7 +77,11 @@ impl BySixteens for Hits<'_> {
     #[inline(always)]
     fn give(&mut self, sixteen: usize, _: u32) {
         match self {
-            Self::Rays(hits) => hits[16 * sixteen..].iter_mut().take(16).for_each(|hit| *hit = Hit::MISS),
+            Self::Rays(hits) => {
+                for hit in hits[16 * sixteen..].iter_mut().take(16) {
+                    *hit = Hit::MISS;
+                }
+            }
             Self::Lanes(hits) => hits[sixteen] = HitPacket::miss(),
         }
     }
