@@ -2,7 +2,7 @@
 //!
 //! A shadow ray starts just off the surface that it leaves: nearer to it than what is known of where it runs from the
 //! light. So the test would be asked of each packet and the triangle that it starts at. From the ray's own origin it can be told in a
-//! quarter of the time: what matters is not how far away the light is, but how far the corners are.
+//! third of the time: what matters is not how far away the light is, but how far the corners are.
 
 use super::{Lanes3, Triangle};
 use crate::simd::Lanes;
@@ -27,7 +27,7 @@ const TINY: f32 = 1e-30;
 /// - The speed is such that the watertight test does not clip that `t`.
 /// - That test keeps `t` between the corners' depths: one of these is less than 0, too.
 #[inline(always)]
-pub(super) fn leave<const W: usize, L: Lanes<W>>(
+pub fn leave<const W: usize, L: Lanes<W>>(
     Triangle { corners, plane }: &Triangle,
     origin: &Lanes3<L>,
     direction: &Lanes3<L>,

@@ -18,6 +18,7 @@ mod test;
 pub mod watertight;
 
 pub use accuracy::Accuracy;
+pub use leaving::leave;
 pub use placed::{Placed, Row, side};
 pub use record::Triangle;
 pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Own, Test, Watertight};

@@ -1,6 +1,5 @@
 //! What every ray-triangle test is to a traversal kernel.
 
-use super::leaving::leave;
 use super::{Accuracy, Placed, Triangle};
 use crate::geometry::Ray;
 use crate::simd::{Eight, Lanes};
@@ -139,7 +138,7 @@ pub trait Mode {
     /// Its name.
     const ACCURACY: Accuracy;
     /// Whether its test says of every ray that passes the edges by more than the error bounds of
-    /// [`Placed`] on which side it does.
+    /// [`Placed`] on which side it does, and finds nothing ahead of one that [leaves](super::leave) a triangle behind.
     const SURE: bool;
     /// Whether signs of edge functions that are not zero decide.
     const SIGNS: bool;
@@ -154,18 +153,6 @@ pub trait Mode {
     #[inline(always)]
     fn alone(ray: &Ray) -> Self::Alone {
         Self::Alone::new(&ray.origin.to_array(), &ray.direction.to_array(), 1)
-    }
-
-    /// The lanes whose rays leave a triangle behind by more than the error bounds of the test, so that it finds nothing of it at a `t`
-    /// of 0 or more, as far as that can be told in little time. All rays must run fastest along `axis`.
-    #[inline(always)]
-    fn leave<const W: usize, L: Lanes<W>>(
-        _triangle: &Self::Record,
-        _origin: &Lanes3<L>,
-        _direction: &Lanes3<L>,
-        _axis: usize,
-    ) -> L::Mask {
-        L::mask_from_bits(0)
     }
 
     /// Each lane's ray against a triangle of its own, from `tnear` to `tfar`: the numbers of a [`Triangle`] in
@@ -212,16 +199,6 @@ impl Mode for Watertight {
     type Alone = super::watertight::Shear<1, f32>;
 
     #[inline(always)]
-    fn leave<const W: usize, L: Lanes<W>>(
-        triangle: &Triangle,
-        origin: &Lanes3<L>,
-        direction: &Lanes3<L>,
-        axis: usize,
-    ) -> L::Mask {
-        leave::<W, L>(triangle, origin, direction, axis)
-    }
-
-    #[inline(always)]
     fn meet_own<const W: usize, L: Lanes<W>>(
         test: &Self::Test<W, L>,
         triangles: &[Lanes3<L>; 4],
@@ -239,14 +216,4 @@ impl Mode for Exact {
     type Record = Triangle;
     type Test<const W: usize, L: Lanes<W>> = super::exact::Filter<W, L>;
     type Alone = super::exact::Filter<1, f32>;
-
-    #[inline(always)]
-    fn leave<const W: usize, L: Lanes<W>>(
-        triangle: &Triangle,
-        origin: &Lanes3<L>,
-        direction: &Lanes3<L>,
-        axis: usize,
-    ) -> L::Mask {
-        leave::<W, L>(triangle, origin, direction, axis)
-    }
 }

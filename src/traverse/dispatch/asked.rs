@@ -7,10 +7,25 @@ use crate::traverse::dispatch::places::Costs;
 use crate::traverse::kernel::Kernel;
 use crate::traverse::lanes::{HitPacket, RayPacket};
 
+/// Has a kernel answer something of packets' lanes, packet by packet.
+type Trace<A> = fn(&Accel, &[RayPacket<16>], &[u32], &mut [A]);
+
+/// The kernels that answer it.
+pub struct Kernels<A> {
+    lists: Trace<A>,
+    /// Up to four squares: more than one are a wide beam, if there are any.
+    beam: Trace<A>,
+    /// Packets of 8, two for each.
+    halves: Trace<A>,
+    packets: Trace<A>,
+}
+
 /// What can be asked of packets.
 pub trait Question {
     /// What a packet answers.
     type Answer;
+
+    const KERNELS: Kernels<Self::Answer>;
 
     /// Whether there are wide beams that answer it.
     const HAS_WIDE_BEAMS: bool;
@@ -21,14 +36,24 @@ pub trait Question {
     /// What is known of a place.
     fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>>;
 
-    /// Has a kernel answer it. Where that takes packets of 8, each goes as two.
+    /// Has a kernel answer it.
+    #[inline(always)]
     fn trace(
         kernel: Kernel,
         accel: &Accel,
         rays: &[RayPacket<16>],
         active: &[u32],
         answers: &mut [Self::Answer],
-    );
+    ) {
+        let Kernels { lists, beam, halves, packets } = Self::KERNELS;
+        let trace = match kernel {
+            Kernel::Filter => lists,
+            Kernel::Tile | Kernel::WideTile => beam,
+            Kernel::Packet8 => halves,
+            _ => packets,
+        };
+        trace(accel, rays, active, answers);
+    }
 }
 
 /// Which hit is the closest.
@@ -36,6 +61,13 @@ pub struct Closest;
 
 impl Question for Closest {
     type Answer = HitPacket<16>;
+
+    const KERNELS: Kernels<Self::Answer> = Kernels {
+        lists: Accel::intersect_lists,
+        beam: Accel::intersect_tile,
+        halves: Accel::intersect_halves,
+        packets: Accel::intersect_packets::<16>,
+    };
 
     const HAS_WIDE_BEAMS: bool = true;
 
@@ -49,22 +81,6 @@ impl Question for Closest {
     fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>> {
         place.closest
     }
-
-    #[inline(always)]
-    fn trace(
-        kernel: Kernel,
-        accel: &Accel,
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        hits: &mut [Self::Answer],
-    ) {
-        match kernel {
-            Kernel::Filter => accel.intersect_lists(rays, active, hits),
-            Kernel::Tile | Kernel::WideTile => accel.intersect_tile(rays, active, hits),
-            Kernel::Packet8 => accel.intersect_halves(rays, active, hits),
-            _ => accel.intersect_packets(rays, active, hits),
-        }
-    }
 }
 
 /// Whether there is any hit.
@@ -72,6 +88,13 @@ pub struct Any;
 
 impl Question for Any {
     type Answer = u32;
+
+    const KERNELS: Kernels<Self::Answer> = Kernels {
+        lists: Accel::occluded_lists,
+        beam: Accel::occluded_tile,
+        halves: Accel::occluded_halves,
+        packets: Accel::occluded_packets::<16>,
+    };
 
     const HAS_WIDE_BEAMS: bool = false;
 
@@ -83,22 +106,6 @@ impl Question for Any {
     #[inline(always)]
     fn costs<'a>(place: &Place<'a>) -> Option<&'a Costs<{ WAYS.len() }>> {
         place.any
-    }
-
-    #[inline(always)]
-    fn trace(
-        kernel: Kernel,
-        accel: &Accel,
-        rays: &[RayPacket<16>],
-        active: &[u32],
-        found: &mut [Self::Answer],
-    ) {
-        match kernel {
-            Kernel::Filter => accel.occluded_lists(rays, active, found),
-            Kernel::Tile | Kernel::WideTile => accel.occluded_tile(rays, active, found),
-            Kernel::Packet8 => accel.occluded_halves(rays, active, found),
-            _ => accel.occluded_packets(rays, active, found),
-        }
     }
 }
 

@@ -18,10 +18,10 @@ const NEAR: f32 = 0.5;
 /// What was learnt about one kind of question.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Learnt {
-    pub lists: Choice<{ LISTS_OR_BEAMS.len() }>,
+    pub lists: Choice<LISTS_OR_BEAMS>,
     pub beams: Beams,
     /// Whether any rays went as lists, and the logarithm of the least that a ray has taken then: but for the first lot, which finds
-    /// nothing made ready, takes ten times as long as others, and would have all that is to come look cheap.
+    /// nothing made ready, takes up to a hundred times as long as others, and would have all that is to come look cheap.
     pub have_gone_as_lists: bool,
     least_by_lists: Option<f32>,
 }
@@ -76,8 +76,7 @@ impl Learnt {
     ) -> Option<usize> {
         let go_as_lists = self.go_as_lists();
         let Self { lists, beams: Beams { squares, .. }, least_by_lists, .. } = self;
-        let count = count(&field.active[..field.active.len().min(LIST)]);
-        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) || count < LEAST_RAYS {
+        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) {
             return None;
         }
         // Where beams are far quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
@@ -86,7 +85,8 @@ impl Learnt {
             lists.quickest() != LISTS && least_by_lists.is_some_and(|least| squares.last() < least);
         let in_beams = squares.quickest() == BEAM && squares.lead() > NEAR;
         let is_settled = is_cheap || in_beams && !go_as_lists;
-        (!is_settled).then(|| lists.next())
+        let of_list = &field.active[..field.active.len().min(LIST)];
+        (!is_settled && count(of_list) >= LEAST_RAYS).then(|| lists.next())
     }
 
     /// Takes note of what a ray took where lists did, logarithm of nanoseconds.

@@ -46,9 +46,9 @@ const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
 /// The first of them.
 const BEAM: usize = 0;
 
-/// What it chooses among for a lot of such squares: lists, or not; and then, a wide beam, or each square by itself. The kernel that
-/// is named second stands for what else is done.
-const LISTS_OR_BEAMS: [Kernel; 2] = [Kernel::Filter, Kernel::Tile];
+/// What it chooses among for a lot of such squares: lists, or beams; and then, a wide beam, or each square by itself, which the kernel
+/// that is named second stands for.
+const LISTS_OR_BEAMS: usize = 2;
 const WIDE_OR_SQUARES: [Kernel; 2] = [Kernel::WideTile, Kernel::Tile];
 
 /// The first of each.

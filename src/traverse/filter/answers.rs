@@ -4,11 +4,9 @@
 
 use crate::geometry::triangle::Mode;
 use crate::geometry::{Hit, Ray};
-use crate::simd::Simd;
 use crate::traverse::HitPacket;
-use crate::traverse::pool::answers::{Met16, Pairs, Sought, Told, is_nearer, tell_hits};
+use crate::traverse::pool::answers::{Told, is_nearer};
 use crate::traverse::records::Resident;
-use crate::traverse::source::Source;
 use crate::traverse::stream::{Answers, Any, Closest};
 
 /// What is asked of each ray, sixteen answers at a time.
@@ -41,35 +39,18 @@ impl Answers for Hits<'_> {
     }
 }
 
-impl Sought for Hits<'_> {
+impl Told for Hits<'_> {
     #[inline(always)]
-    fn offer(&mut self, place: usize, hit: &Hit) {
+    fn offer(&mut self, ray: usize, hit: &Hit) {
         match self {
-            Self::Rays(hits) => Closest(hits).offer(place, hit),
+            Self::Rays(hits) => Closest(hits).offer(ray, hit),
             Self::Lanes(hits) => {
-                let (hits, lane) = (&mut hits[place / 16], place % 16);
+                let (hits, lane) = (&mut hits[ray / 16], ray % 16);
                 if is_nearer(hit, hits.t[lane], hits.primitive[lane]) {
                     hits.set(lane, hit);
                 }
             }
         }
-    }
-}
-
-impl Told for Hits<'_> {
-    #[inline(always)]
-    fn hits(&mut self, _ray: usize) {}
-
-    #[inline(always)]
-    fn tell<S: Simd, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        pairs: &Pairs,
-        count: usize,
-        found: &Met16<S::F16>,
-    ) {
-        tell_hits::<S, M>(self, tree, rays, pairs, count, found);
     }
 }
 

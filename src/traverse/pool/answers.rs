@@ -97,8 +97,13 @@ impl<L: Sixteen> Met16<L> {
 
 /// Where the answers of rays go that may hit some triangles.
 pub trait Told: Answers {
-    /// A ray hits something. Where the closest hits are wanted, that says nothing.
-    fn hits(&mut self, ray: usize);
+    /// A ray hits something. Where the closest hits are wanted, nobody says so.
+    #[inline(always)]
+    fn hits(&mut self, _ray: usize) {}
+
+    /// Takes a hit for a ray, if it is [nearer](is_nearer) than what that had. Where any hit will do, none is offered.
+    #[inline(always)]
+    fn offer(&mut self, _ray: usize, _hit: &Hit) {}
 
     /// Takes up what rays found of a triangle each, of the first `count` that wait.
     #[inline(always)]
@@ -110,8 +115,37 @@ pub trait Told: Answers {
         count: usize,
         found: &Met16<S::F16>,
     ) {
-        for ray in found.rays::<M>(tree, rays, pairs, count) {
-            self.hits(ray);
+        if Self::ANY {
+            for ray in found.rays::<M>(tree, rays, pairs, count) {
+                self.hits(ray);
+            }
+            return;
+        }
+        let Met16 { own, corners: [a, b, c] } = found;
+        let corners = [
+            [a[0].store(), a[1].store(), a[2].store()],
+            [b[0].store(), b[1].store(), b[2].store()],
+            [c[0].store(), c[1].store(), c[2].store()],
+        ];
+        let [x, y, z] = triangle::normals(&corners);
+        let zero = S::F16::splat(0.0);
+        // A zero is given out without a sign.
+        let numbers = S::F16::fours(&[own.t + zero, own.u + zero, own.v + zero, zero]);
+        let present = (1 << count) - 1;
+        let mut hits = own.hits & present;
+        while hits != 0 {
+            let lane = hits.trailing_zeros() as usize % 16;
+            hits &= hits - 1;
+            let [t, u, v, _] = numbers[lane];
+            let (primitive, normal) = (pairs.primitives[lane] as u32, [x[lane], y[lane], z[lane]].into());
+            self.offer(pairs.rays[lane] as usize, &Hit { t, u, v, primitive, normal });
+        }
+        let mut open = own.open & present;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % 16;
+            open &= open - 1;
+            let ray = pairs.rays[lane] as usize;
+            self.offer(ray, &hit_of_one::<M>(tree, &rays.ray(ray), pairs.primitives[lane] as u32));
         }
     }
 
@@ -197,79 +231,19 @@ pub trait OfFlights: Told + OneByOne {
     fn decide<M: Mode>(&mut self, tree: &Resident<'_, M::Record>, ray: usize, nearest: Option<Nearest>);
 }
 
-/// Closest hits that are looked for, a place for each ray's.
-pub trait Sought {
-    /// Takes a hit for the ray in a place, if it is [nearer](is_nearer) than what that had.
-    fn offer(&mut self, place: usize, hit: &Hit);
-}
-
 /// Whether a hit counts in place of what was had, given by `t` and id: it is nearer, or as near and of a lower id.
 #[inline(always)]
 pub fn is_nearer(hit: &Hit, t: f32, primitive: u32) -> bool {
     hit.t < t || hit.t == t && hit.primitive < primitive
 }
 
-/// [`Told::tell`] where closest hits are looked for.
-#[inline(always)]
-pub fn tell_hits<S: Simd, M: Mode>(
-    sought: &mut impl Sought,
-    tree: &Resident<'_, M::Record>,
-    rays: Source<'_>,
-    pairs: &Pairs,
-    count: usize,
-    Met16 { own, corners: [a, b, c] }: &Met16<S::F16>,
-) {
-    let corners = [
-        [a[0].store(), a[1].store(), a[2].store()],
-        [b[0].store(), b[1].store(), b[2].store()],
-        [c[0].store(), c[1].store(), c[2].store()],
-    ];
-    let [x, y, z] = triangle::normals(&corners);
-    let zero = S::F16::splat(0.0);
-    // A zero is given out without a sign.
-    let numbers = S::F16::fours(&[own.t + zero, own.u + zero, own.v + zero, zero]);
-    let present = (1 << count) - 1;
-    let mut hits = own.hits & present;
-    while hits != 0 {
-        let lane = hits.trailing_zeros() as usize % 16;
-        hits &= hits - 1;
-        let [t, u, v, _] = numbers[lane];
-        let (primitive, normal) = (pairs.primitives[lane] as u32, [x[lane], y[lane], z[lane]].into());
-        sought.offer(pairs.rays[lane] as usize, &Hit { t, u, v, primitive, normal });
-    }
-    let mut open = own.open & present;
-    while open != 0 {
-        let lane = open.trailing_zeros() as usize % 16;
-        open &= open - 1;
-        let ray = pairs.rays[lane] as usize;
-        sought.offer(ray, &hit_of_one::<M>(tree, &rays.ray(ray), pairs.primitives[lane] as u32));
-    }
-}
-
-impl Sought for Closest<'_> {
+impl Told for Closest<'_> {
     #[inline(always)]
-    fn offer(&mut self, place: usize, hit: &Hit) {
-        let had = &mut self.0[place];
+    fn offer(&mut self, ray: usize, hit: &Hit) {
+        let had = &mut self.0[ray];
         if is_nearer(hit, had.t, had.primitive) {
             *had = *hit;
         }
-    }
-}
-
-impl Told for Closest<'_> {
-    #[inline(always)]
-    fn hits(&mut self, _ray: usize) {}
-
-    #[inline(always)]
-    fn tell<S: Simd, M: Mode>(
-        &mut self,
-        tree: &Resident<'_, M::Record>,
-        rays: Source<'_>,
-        pairs: &Pairs,
-        count: usize,
-        found: &Met16<S::F16>,
-    ) {
-        tell_hits::<S, M>(self, tree, rays, pairs, count, found);
     }
 }
 

@@ -10,7 +10,7 @@ use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut};
 use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
-use crate::geometry::triangle::{Mode, Test};
+use crate::geometry::triangle::{Mode, Test, leave};
 use crate::simd::{Lanes, Mask, Sixteen};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::RayPacket;
@@ -72,16 +72,19 @@ where
     #[inline(always)]
     fn decide(&self, packet: usize, part: usize, primitive: u32, doubtful: R::Mask) -> R::Mask {
         let rays = &self.rays[packet];
-        let record = self.tree.record_of(primitive);
         let origin = load_part3::<N, R>(&rays.origin, part);
         let direction = load_part3::<N, R>(&rays.direction, part);
-        // Nearly always it is what they have just left.
-        let doubtful = doubtful & !M::leave::<N, R>(record, &origin, &direction, self.axis);
-        if !doubtful.any() {
-            return doubtful;
+        let mut doubtful = doubtful;
+        if M::SURE {
+            // Nearly always it is what they have just left.
+            let triangle = self.tree.triangle(primitive);
+            doubtful = doubtful & !leave::<N, R>(triangle, &origin, &direction, self.axis);
+            if !doubtful.any() {
+                return doubtful;
+            }
         }
         let test = M::Test::<N, R>::new(&origin, &direction, doubtful.bits());
-        let candidate = test.test(record, doubtful);
+        let candidate = test.test(self.tree.record_of(primitive), doubtful);
         // As a packet's closest hit is taken, which is none beyond the greatest float.
         let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
         let tnear = load_part::<N, R>(&rays.tnear, part);
