@@ -21,7 +21,7 @@ struct Seen<const W: usize, L: Lanes<W>> {
     /// Their words in the list.
     words: L::Ids,
     /// Those of which something is left.
-    live: u32,
+    live: L::Mask,
     /// 1 / direction.
     inverse: [L; 3],
     /// What is added for near faces, and for far ones.
@@ -50,7 +50,7 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
             [near[axis], far[axis]] =
                 thick(crossing.origin[axis], crossing.inverse[axis], crossing.margin[axis]);
         }
-        let live = tmin.le(closest).bits() & present;
+        let live = tmin.le(closest) & L::mask_from_bits(present);
         Self { words, live, inverse: crossing.inverse, near, far, tmin, closest }
     }
 
@@ -75,7 +75,7 @@ impl<const W: usize, L: Dense<W>> Seen<W, L> {
             // (`max` and `min` keep a NaN that stands on their right.)
             (enters, leaves) = (first.max(enters), last.min(leaves));
         }
-        (enters.le(leaves).bits() & self.live, enters)
+        ((enters.le(leaves) & self.live).bits(), enters)
     }
 }
 
@@ -122,7 +122,7 @@ pub fn cut<const W: usize, L: Dense<W>, const ANY: bool>(
     let mut next = begin;
     for done in (0..len).step_by(W) {
         let seen = Seen::<W, L>::new::<ANY>(lot, entries, at + done, len - done);
-        if seen.live == 0 {
+        if !seen.live.any() {
             continue;
         }
         for (place, &lane) in lanes.iter().enumerate() {

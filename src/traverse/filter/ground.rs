@@ -21,7 +21,8 @@ pub trait Ground {
     /// Lists of so many rays, or fewer, have a way of their own through an inner place.
     const SEVERAL: u32 = 0;
 
-    /// Whether [shears](crate::geometry::triangle::pooled::shears) are kept of rays in place of directions.
+    /// Whether [shears](crate::geometry::triangle::pooled::shears) are kept of rays in place of directions, and nobody asks where they
+    /// end inside of the scene's bounds.
     const SHEARS: bool;
 
     /// Whether a leaf's triangles are fetched a turn before a list meets them.

@@ -117,12 +117,14 @@ impl Entries {
         }
     }
 
-    /// Writes rays of an octant from `at` on, and the ends of their intervals inside of the scene's bounds; where the next octant's
-    /// may begin.
+    /// Writes rays of an octant from `at` on, and the ends of their intervals inside of the scene's bounds, if somebody asks for
+    /// them; where the next octant's may begin.
     #[inline(always)]
-    pub fn begin(&mut self, words: &[i32], tmax: &[f32], at: usize) -> usize {
+    pub fn begin(&mut self, words: &[i32], tmax: Option<&[f32]>, at: usize) -> usize {
         self.words[at..][..words.len()].copy_from_slice(words);
-        self.tmax[at..][..words.len()].copy_from_slice(tmax);
+        if let Some(tmax) = tmax {
+            self.tmax[at..][..words.len()].copy_from_slice(tmax);
+        }
         at + room(words.len())
     }
 

@@ -68,12 +68,14 @@ pub struct Octant {
 impl Octant {
     const NONE: Self = Self { ids: [0; LOT + 16], tmax: [0.0; LOT + 16], count: 0 };
 
-    /// Puts those rays there whose bits are set.
+    /// Puts those rays there whose bits are set, and where they end, if that is kept.
     #[inline(always)]
-    fn put<L: Sixteen>(&mut self, bits: u32, ids: L::Ids, [tmin, tmax]: [L; 2]) {
+    fn put<L: Sixteen>(&mut self, bits: u32, tagged: L::Ids, tmax: Option<L>) {
         let (at, room) = (self.count % (LOT + 1), "a register behind the last");
-        L::ids_compact(tmin.tag(ids), bits, self.ids[at..].first_chunk_mut().expect(room));
-        tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
+        L::ids_compact(tagged, bits, self.ids[at..].first_chunk_mut().expect(room));
+        if let Some(tmax) = tmax {
+            tmax.compact(bits, self.tmax[at..].first_chunk_mut().expect(room));
+        }
         self.count = at + bits.count_ones() as usize;
     }
 
@@ -83,7 +85,7 @@ impl Octant {
         &self.ids[..self.count]
     }
 
-    /// Where they end inside of the scene's bounds.
+    /// Where they end inside of the scene's bounds, if that is kept.
     #[inline(always)]
     pub fn tmax(&self) -> &[f32] {
         &self.tmax[..self.count]
@@ -127,7 +129,8 @@ impl Lot {
     }
 
     /// Makes the rays of up to [`LOT`] places ready, those of some sixteens. With `SHEARS`, shears are kept of them in place of
-    /// directions. With `BEGIN`, it is kept with each where it begins; without, the id of what it has found.
+    /// directions, and not where they end inside of the scene's bounds. With `BEGIN`, it is kept with each where it begins; without,
+    /// the id of what it has found.
     #[inline(always)]
     pub fn prepare<L: Sixteen, const SHEARS: bool, const BEGIN: bool>(
         &mut self,
@@ -189,6 +192,7 @@ impl Lot {
         }
         let [if_x, if_y, if_z] = [L::ids_load(&ids[0]), L::ids_load(&ids[1]), L::ids_load(&ids[2])];
         let ids = L::ids_select(is_x, if_x, L::ids_select(is_y, if_y, if_z));
+        let (tagged, tmax) = (tmin.tag(ids), (!SHEARS).then_some(tmax));
         let zero = L::splat(0.0);
         let down = [inverse[0].lt(zero).bits(), inverse[1].lt(zero).bits(), inverse[2].lt(zero).bits()];
         for (number, octant) in self.octants.iter_mut().enumerate() {
@@ -196,7 +200,7 @@ impl Lot {
             for (axis, down) in down.iter().enumerate() {
                 bits &= if number >> axis & 1 == 1 { *down } else { !down };
             }
-            octant.put::<L>(bits, ids, [tmin, tmax]);
+            octant.put::<L>(bits, tagged, tmax);
         }
         L::select(fly, reach, zero)
     }

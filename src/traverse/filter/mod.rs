@@ -136,7 +136,7 @@ fn walk<S: Simd, M: Mode, G: Ground, const ANY: bool>(at: &At<'_, M::Record>, gr
         let of_octant = rays.lot.octant(octant);
         let ids = of_octant.ids();
         heads[octant].push(0, begin, ids.len());
-        begin = entries.begin(ids, of_octant.tmax(), begin);
+        begin = entries.begin(ids, (!G::SHEARS).then_some(of_octant.tmax()), begin);
         waiting |= u32::from(!ids.is_empty()) << octant;
     }
     while waiting != 0 {

@@ -95,7 +95,7 @@ impl Cuts<'_> {
             for (i, exit) in places.clone().enumerate() {
                 let len = [1, 2, 3, 4, 8, 9, 15, 16, 17, 40, 300][i % 11].min(ids.len());
                 let begin = |entries: &mut Entries, rays: Range<usize>| {
-                    entries.begin(&ids[rays.clone()], &tmax[rays.clone()], 0);
+                    entries.begin(&ids[rays.clone()], Some(&tmax[rays.clone()]), 0);
                     List { exit, at: 0, len: rays.len() as u32 }
                 };
                 let list = begin(&mut entries, 0..len);
