@@ -51,7 +51,7 @@ struct Slices<const N: usize> {
     choice: Choice<N>,
     /// How many rays each has traced.
     traced: [u64; N],
-    /// With how many rays lists are tried.
+    /// With how many rays lists are tried where there are no pools.
     trial_of_lists: usize,
 }
 
@@ -112,6 +112,8 @@ impl<const N: usize> Slices<N> {
         let way = self.choice.next();
         let most = match self.ways[way] {
             _ if way == quickest => LOT,
+            // Through pools, lists of rays that lie together are often the quickest, and the quicker the more rays there are.
+            Kernel::Filter if accel.pools().is_some() => LOT,
             Kernel::Filter => self.trial_of_lists,
             _ => TRIAL,
         };
@@ -145,8 +147,8 @@ pub struct SliceDispatch {
 impl Default for SliceDispatch {
     fn default() -> Self {
         use Kernel::{Filter, Packet8, Packet16, Tile, WideTile};
-        // Lists of rays that lie together are several times slower than beams, or quicker than packets already where few
-        // are tried.
+        // Without pools, lists of rays that lie together are several times slower than beams, or quicker than packets already
+        // where few are tried.
         Self {
             closest: Slices::among([Tile, Packet16, Packet8, Filter, WideTile], TRIAL),
             any: Slices::among([Tile, Packet16, Packet8, Filter], TRIAL),
@@ -227,6 +229,7 @@ mod tests {
     use crate::mesh::generate::shapes;
     use crate::simd::Isa;
     use glam::Vec3;
+    use std::time::Duration;
 
     fn soup() -> Accel {
         Accel::build(&shapes::soup(200, 1), &BuildParams::default()).expect("a soup has a tree")
@@ -267,6 +270,23 @@ mod tests {
             rays.swap(i, (state >> 8) as usize % (i + 1));
         }
         rays
+    }
+
+    #[test]
+    fn lists_are_tried_with_as_many_rays_as_they_hold_where_there_are_pools() {
+        for (pools, most) in [(false, TRIAL), (true, LOT)] {
+            let accel = soup();
+            if pools {
+                accel.make_pools().expect("all is in memory");
+            }
+            let mut slices = SliceDispatch::default().any;
+            let tried = (0..8).find_map(|_| {
+                let Next { way, rays, .. } = slices.next(&accel, 3 * LOT);
+                slices.choice.record(way, rays, Duration::from_micros(10));
+                (slices.ways[way] == Kernel::Filter).then_some(rays)
+            });
+            assert_eq!(tried, Some(most), "pools: {pools}");
+        }
     }
 
     #[test]
