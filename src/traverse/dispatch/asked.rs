@@ -120,7 +120,13 @@ pub struct Asked<'a, 'p, A> {
     pub answers: &'a mut [A],
 }
 
-impl<'a, A> Asked<'a, '_, A> {
+impl<'a, 'p, A> Asked<'a, 'p, A> {
+    /// The same once more, to be answered before this is.
+    pub fn again(&mut self) -> Asked<'_, 'p, A> {
+        let Self { places, rays, active, ref mut answers } = *self;
+        Asked { places, rays, active, answers }
+    }
+
     /// The first `count` packets, whole squares, or as many as there are; and what is left.
     pub fn split(self, count: usize) -> (Self, Self) {
         let Self { places, rays, active, answers } = self;

@@ -20,8 +20,8 @@
 //! The quickest way is taken, and the others are tried now and then: the seldomer, the slower they are.
 //!
 //! What a lot takes beside the one before it has a standard deviation of 0.5 to 1.2, as a logarithm: so some hundred of them are
-//! remembered, not more, as places change. Ways that are to one another much as they are everywhere need not be told apart kind by
-//! kind ([`Choice::of_all_places`]). Later replays, which the figures here were chosen by, are in `docs/coherent.md`.
+//! remembered, not more, as places change. Two ways that are to one another much as they are everywhere are compared by
+//! going both ([`duel`](super::duel)). Later replays, which the figures here were chosen by, are in `docs/coherent.md`.
 //!
 //! **Places that were seen before** ([`places`](super::places)) have figures of their own. There the way is taken that was
 //! quickest at that very place, as far as a few visits tell; one that was not tried there yet is expected to be to the others
@@ -34,10 +34,8 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug)]
 pub struct Choice<const WAYS: usize> {
     kinds: [Kind<WAYS>; KINDS],
-    /// What each way costs beside what is timed, as a logarithm; infinite of one that is left out.
-    beside: [f32; WAYS],
-    /// The way that is quickest over all kinds of place, if that is taken everywhere.
-    everywhere: Option<usize>,
+    /// Ways that are left out.
+    out: [bool; WAYS],
     /// The kind of place that the next lot is thought to be in.
     here: usize,
     /// Logarithm (base 2) of the nanoseconds a ray of the last lot took.
@@ -75,15 +73,6 @@ const FIRST: u32 = 2;
 /// middle, so that it takes a hundred of them to tell a tenth.
 const WEIGHT: f32 = 0.02;
 const WEIGHT_OF_TRIAL: f32 = 0.03;
-
-/// The same of a choice for all kinds of place, which has all lots to learn from, and less to tell apart: with as much as above, what it
-/// took changed within a picture though nothing else had.
-const WEIGHT_EVERYWHERE: f32 = 0.005;
-
-/// In how many lots a choice for all kinds of place is looked over, and what a way's figure in a kind counts at most, in lots: about as
-/// many as it remembers.
-const LOOKED_OVER: u32 = 8;
-const REMEMBERED: u32 = 400;
 
 /// Logarithms are kept within this: beyond, something else ran meanwhile.
 const SPIKE: f32 = 2.0;
@@ -125,8 +114,7 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
         let kind = Kind { cost: [0.0; WAYS], taken: [0; WAYS], wait: [0.0; WAYS] };
         Self {
             kinds: [kind; KINDS],
-            beside: [0.0; WAYS],
-            everywhere: None,
+            out: [false; WAYS],
             here: KINDS / 2,
             last: 0.0,
             lots: 0,
@@ -137,26 +125,19 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
 }
 
 impl<const WAYS: usize> Choice<WAYS> {
-    /// Among ways that are to one another much as they are everywhere: the one is taken that is quickest over all kinds of place, so that
-    /// a smaller difference is told from noise. Each way costs something beside what is timed, as a logarithm (base 2): it must be so
-    /// much quicker.
-    pub fn of_all_places(beside: [f32; WAYS]) -> Self {
-        Self { beside, everywhere: Some(0), ..Self::default() }
-    }
-
     /// Never takes a way from now on.
     pub fn leave_out(&mut self, way: usize) {
         if self.is_out(way) {
             return;
         }
-        self.beside[way] = f32::INFINITY;
+        self.out[way] = true;
         for kind in &mut self.kinds {
             (kind.cost[way], kind.wait[way]) = (f32::INFINITY, f32::INFINITY);
         }
     }
 
     fn is_out(&self, way: usize) -> bool {
-        self.beside[way] == f32::INFINITY
+        self.out[way]
     }
 
     /// Those that are not left out.
@@ -274,9 +255,6 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// The way that is thought to be quickest for the next lot.
     pub fn quickest(&self) -> usize {
-        if let Some(way) = self.everywhere {
-            return way;
-        }
         self.kind_here().quickest()
     }
 
@@ -314,15 +292,11 @@ impl<const WAYS: usize> Choice<WAYS> {
         if rays == 0 {
             return None;
         }
-        // Clocks may stand still over a short lot.
-        let new = ((time.as_nanos() as f32).max(1.0) / rays as f32).log2();
+        let new = cost_of(rays, time);
         if !self.by_place {
             self.learn(way, new);
         }
         self.lots = self.lots.saturating_add(1);
-        if self.everywhere.is_some() && self.lots.is_multiple_of(LOOKED_OVER) {
-            self.everywhere = Some(self.quickest_of_all());
-        }
         self.last = new;
         // All ways are tried in one kind of place at first, before others are told from it. And which kind it is, only what the
         // quickest way takes tells: what is tried may be many times slower.
@@ -332,40 +306,15 @@ impl<const WAYS: usize> Choice<WAYS> {
         Some(new)
     }
 
-    /// The way that is quickest over all kinds of place: by what sets it apart from the first one in each, weighted by how well that is
-    /// known there. (What ways cost at all hangs on the kind: which one of them was taken where must not count.)
-    fn quickest_of_all(&self) -> usize {
-        let apart: [f32; WAYS] = std::array::from_fn(|way| {
-            if self.is_out(way) {
-                return f32::INFINITY;
-            }
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for Kind { cost, taken, .. } in &self.kinds {
-                let [first, other] = [taken[0], taken[way]].map(|taken| taken.min(REMEMBERED) as f32);
-                if first > 0.0 && other > 0.0 {
-                    let weight = first * other / (first + other);
-                    sum += weight * (cost[way] - cost[0]);
-                    weights += weight;
-                }
-            }
-            if weights > 0.0 { sum / weights } else { 0.0 }
-        });
-        smallest(&apart)
-    }
-
     /// Learns from what a lot cost.
     fn learn(&mut self, way: usize, new: f32) {
         let before = if self.lots == 0 { new } else { self.last };
         let kind = &mut self.kinds[self.here];
         let quickest = kind.quickest();
-        let cost = (new + self.beside[way] - before).clamp(-SPIKE, SPIKE);
+        let cost = (new - before).clamp(-SPIKE, SPIKE);
         let surprise = way != quickest && cost < kind.cost[quickest];
         kind.taken[way] = kind.taken[way].saturating_add(1);
-        let weight = match self.everywhere {
-            Some(_) => WEIGHT_EVERYWHERE,
-            None if way == quickest => WEIGHT,
-            None => WEIGHT_OF_TRIAL,
-        };
+        let weight = if way == quickest { WEIGHT } else { WEIGHT_OF_TRIAL };
         kind.cost[way] += weight.max(1.0 / kind.taken[way] as f32) * (cost - kind.cost[way]);
         kind.wait[way] = if surprise { WAIT_AFTER_SURPRISE } else { kind.wait_of(way) };
     }
@@ -390,6 +339,12 @@ impl<const WAYS: usize> Kind<WAYS> {
         let known = (self.taken[way] as f32 / KNOWN_WELL).min(1.0);
         (LEAST_WAIT + WAIT * slower * known).min(MOST_WAIT)
     }
+}
+
+/// Logarithm (base 2) of the nanoseconds that each of some rays took.
+pub fn cost_of(rays: usize, time: Duration) -> f32 {
+    // Clocks may stand still over a short lot.
+    ((time.as_nanos() as f32).max(1.0) / rays as f32).log2()
 }
 
 /// What each way is expected to cost at a place where some of them, at least one, are known to, if they cost `elsewhere`,

@@ -2,14 +2,17 @@
 //! each square.
 
 use super::asked::{Asked, Question, count};
-use super::choice::Choice;
+use super::choice::{Choice, cost_of};
+use super::duel::{Duel, Turn};
 use super::places::Costs;
 use super::{
-    BEAM, BESIDE, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, WIDE_OR_SQUARES,
-    leave_out_halves, recorded, timed,
+    BEAM, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, leave_out_halves,
+    recorded, timed,
 };
 use crate::traverse::accel::Accel;
 use crate::traverse::kernel::Kernel;
+use crate::traverse::stopwatch::Stopwatch;
+use std::time::Duration;
 
 /// Where packets take no longer than that beside beams, as a logarithm (base 2), lists are tried: they share more than packets do, and
 /// less than beams. (Chosen by replays, see `docs/coherent.md`.)
@@ -26,17 +29,11 @@ pub struct Learnt {
     least_by_lists: Option<f32>,
 }
 
-/// The same about what is done where rays do not go as lists.
-#[derive(Clone, Copy, Debug)]
+/// The same about what is done where rays do not go as lists: wide beams beside squares, and what squares do.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Beams {
-    pub wide: Choice<{ WIDE_OR_SQUARES.len() }>,
+    pub wide: Duel,
     pub squares: Choice<{ WAYS.len() }>,
-}
-
-impl Default for Beams {
-    fn default() -> Self {
-        Self { wide: Choice::of_all_places(BESIDE), squares: Choice::default() }
-    }
 }
 
 impl Learnt {
@@ -108,29 +105,45 @@ impl Learnt {
         let Beams { wide, squares } = &self.beams;
         match WAYS[squares.quickest()] {
             _ if self.go_as_lists() => Kernel::Filter,
-            Kernel::Tile if !wide.is_beginning() && wide.quickest() == WIDE => Kernel::WideTile,
+            Kernel::Tile if !wide.is_beginning() && wide.quicker() == WIDE => Kernel::WideTile,
             kernel => kernel,
         }
     }
 }
 
 impl Beams {
-    /// Has a lot traced, wide or square by square.
-    fn lot<Q: Question>(&mut self, accel: &Accel, lot: Asked<'_, '_, Q::Answer>) {
+    /// Has a lot traced, wide or square by square, or, to compare the two, both.
+    fn lot<Q: Question>(&mut self, accel: &Accel, mut lot: Asked<'_, '_, Q::Answer>) {
         let Self { wide, squares } = self;
         // Where packets are quicker than beams, wide ones are out of the question.
         let packets_were_quicker =
             |place: &Place<'_>| Q::costs(place).is_some_and(|costs| costs.is_slower(BEAM));
         let in_beams = squares.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
-        if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams {
+        let count = lot.count();
+        if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams || count < LEAST_RAYS {
             return by_squares::<Q>(squares, accel, lot);
         }
-        let taken = timed(accel, &WIDE_OR_SQUARES, wide, None, lot.count(), |kernel| match kernel {
-            Kernel::WideTile => lot.trace::<Q>(accel, kernel),
-            _ => by_squares::<Q>(squares, accel, lot),
-        });
-        if let Some((WIDE, cost)) = taken {
-            squares.pass(cost);
+        let mut trace = |way, lot: Asked<'_, '_, Q::Answer>| {
+            let start = Stopwatch::start(accel);
+            match way {
+                WIDE => lot.trace::<Q>(accel, Kernel::WideTile),
+                _ => by_squares::<Q>(squares, accel, lot),
+            }
+            start.elapsed(accel)
+        };
+        match wide.next() {
+            Turn::One(WIDE) => {
+                let spent = trace(WIDE, lot);
+                squares.pass(cost_of(count, spent));
+            }
+            Turn::One(_) => by_squares::<Q>(squares, accel, lot),
+            Turn::Both(ways) => {
+                let mut spent = [Duration::ZERO; 2];
+                for way in ways {
+                    spent[way] = trace(way, lot.again());
+                }
+                wide.record(spent);
+            }
         }
     }
 }

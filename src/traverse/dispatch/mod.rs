@@ -8,7 +8,7 @@
 //! first of its kind, at that [place](Places). Only time hangs on the choice: hits are the same, bit for bit.
 //!
 //! It is chosen up to three times. A *lot* of four squares may go as lists of rays; if it does not, as one wide beam, where squares go
-//! best as beams. Which is better is learnt from what lots have cost either way. If a lot does neither, each of its squares is chosen for by
+//! best as beams. Which is better is learnt from what lots have cost either way, and of wide beams from what the same lots did. If a lot does neither, each of its squares is chosen for by
 //! itself, as triangles as small as pixels want it. Of some lots at once, a *field*, all go as one list that are left when a list's turn comes.
 //!
 //! What a choice costs counts where rays take 10 ns. So where squares go best as beams, or there is next to nothing to be met, and
@@ -16,6 +16,7 @@
 
 mod asked;
 mod choice;
+mod duel;
 mod learnt;
 mod places;
 mod pool;
@@ -46,19 +47,13 @@ const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
 /// The first of them.
 const BEAM: usize = 0;
 
-/// What it chooses among for a lot of such squares: lists, or beams; and then, a wide beam, or each square by itself, which the kernel
-/// that is named second stands for.
+/// What it chooses among for a lot of such squares: lists, or beams; and then, a wide beam, or each square by itself, of which there are
+/// two, too.
 const LISTS_OR_BEAMS: usize = 2;
-const WIDE_OR_SQUARES: [Kernel; 2] = [Kernel::WideTile, Kernel::Tile];
 
 /// The first of each.
 const LISTS: usize = 0;
 const WIDE: usize = 0;
-
-/// What a lot costs beside what is timed, as a logarithm: lots that go one way and another by turns find neither the code nor what
-/// it works with at hand. Where each other lot of the statue's camera rays went wide, all took 1.085 times as long as small beams,
-/// where wide ones alone take 1.055 times.
-const BESIDE: [f32; WIDE_OR_SQUARES.len()] = [0.08, 0.0];
 
 /// Packets of a lot. More than that are a field.
 const LOT: usize = 4 * PACKETS;
