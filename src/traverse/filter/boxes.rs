@@ -14,7 +14,7 @@ use super::lists::{Entries, Heads, List};
 use super::lot::{Crossing, Lot};
 use crate::kdtree::Boxes;
 use crate::simd::{Dense, Eight, Lanes, Mask, Sixteen};
-use crate::traverse::pool::step::{Met, meet, thick};
+use crate::traverse::pool::step::{Met, Spread, meet, thick};
 
 /// Rays of a list as boxes see them.
 struct Seen<const W: usize, L: Lanes<W>> {
@@ -194,7 +194,8 @@ pub fn take_one<L: Eight, const ANY: bool>(
     let (word, tmin, _) = entries.one(at);
     let (slabs, closest) = lot.slabs(word);
     let tmin = if ANY { lot.begin(word) } else { tmin };
-    let Met { ways, enters, bits, .. } = meet::<L>(node, &slabs, tmin, closest, false);
+    let Met { ways, enters, bits, .. } =
+        meet(node, &Spread::<L>::new(&slabs), L::splat(tmin), L::splat(closest), false);
     if ANY {
         entries.write_one(at, word);
     } else {

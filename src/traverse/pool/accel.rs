@@ -10,7 +10,9 @@ use crate::traverse::Accel;
 use crate::traverse::accel::Storage;
 use crate::traverse::query::ResidentQuery;
 use crate::traverse::records::Resident;
+use crate::traverse::stream::step::Waiting;
 use crate::traverse::stream::{Any, Closest};
+use std::cell::RefCell;
 
 impl Accel {
     /// Makes leaves that hold their corners ([`Pools`]), for streams, lists and rays that come one a call to go through: rays
@@ -60,7 +62,9 @@ impl Accel {
     #[inline(never)]
     pub(in crate::traverse) fn intersect_alone(&self, pools: &Pools, ray: &Ray) -> Hit {
         let mut hit = [Hit::MISS];
-        self.ask_closed(Alone { pools, ray, answers: Closest(&mut hit) });
+        WAITING.with_borrow_mut(|waiting| {
+            self.ask_closed(Alone { pools, ray, waiting, answers: Closest(&mut hit) });
+        });
         hit[0]
     }
 
@@ -68,7 +72,9 @@ impl Accel {
     #[inline(never)]
     pub(in crate::traverse) fn occluded_alone(&self, pools: &Pools, ray: &Ray) -> bool {
         let mut occluded = [false];
-        self.ask_closed(Alone { pools, ray, answers: Any(&mut occluded) });
+        WAITING.with_borrow_mut(|waiting| {
+            self.ask_closed(Alone { pools, ray, waiting, answers: Any(&mut occluded) });
+        });
         occluded[0]
     }
 }
@@ -98,15 +104,22 @@ impl<A: OfFlights> ResidentQuery for InPools<'_, A> {
     }
 }
 
+thread_local! {
+    /// The stack of a thread's ray. (It is taken here, and not where it is used, as a closure of the library's would be compiled
+    /// without the instruction set.)
+    static WAITING: RefCell<Waiting> = const { RefCell::new(Waiting::new()) };
+}
+
 struct Alone<'a, A> {
     pools: &'a Pools,
     ray: &'a Ray,
+    waiting: &'a mut Waiting,
     answers: A,
 }
 
 impl<A: OfFlights> ResidentQuery for Alone<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        alone::trace::<S, M, A>(tree, self.pools, self.ray, &mut self.answers);
+        alone::trace::<S, M, A>(tree, self.pools, self.ray, self.waiting, &mut self.answers);
     }
 }

@@ -4,7 +4,8 @@
 //! asks the mode's test of a triangle and of the ray that may hit it, and hits are written by whole registers, where they are nearer
 //! than what the same ray had before.
 
-use super::flight::{Flight, Nearest};
+use super::flight::Flight;
+use super::list::Nearest;
 use crate::geometry::triangle::{self, Candidate, Mode, Own, Test, Triangle};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{MOST, Tree};
@@ -32,7 +33,7 @@ impl Pairs {
         let place = self.count.min(ROOM);
         self.rays[place..][..2 * MOST].fill(flight.ray as i32);
         let primitives = self.primitives[place..].first_chunk_mut().expect("room for a list");
-        self.count = place + flight.listed::<L>(primitives);
+        self.count = place + flight.list.write::<L>(flight.tfar, primitives);
         for primitive in &self.primitives[place..][..2] {
             prefetch_both(records.as_ptr().wrapping_add(*primitive as usize));
         }
@@ -220,7 +221,7 @@ pub trait OfFlights: Told + OneByOne {
         pairs: &mut Pairs,
     ) {
         self.missed(flight.ray as usize);
-        if flight.is_empty() {
+        if flight.list.is_empty() {
             return;
         }
         pairs.put_all::<S::F16>(flight, tree.tree.triangles());

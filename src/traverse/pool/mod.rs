@@ -2,7 +2,7 @@
 //!
 //! As the [stream kernel](super::stream) it has some thirty rays on their way at once, and each round does one piece of
 //! work for each: a node of eight boxes ([`step`]), or a chunk of up to sixteen triangles ([`crate::kdtree::Pools`]). What it does
-//! not do is to ask the mode's test of each triangle: what a ray may hit is kept ([`flight`]), and in the end the test is
+//! not do is to ask the mode's test of each triangle: what a ray may hit is kept ([`list`]), and in the end the test is
 //! asked of the one or two triangles that are left, sixteen of them at a time ([`answers`]).
 //!
 //! ```text
@@ -21,6 +21,7 @@ mod accel;
 mod alone;
 pub mod answers;
 mod flight;
+mod list;
 mod start;
 pub mod step;
 pub mod ways;
@@ -112,8 +113,7 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
                 free.put_if(k, true);
                 continue;
             }
-            let Finds { possible, certain, next } =
-                flight.look::<S::F16, M, false>(ways.words, way.word(), A::ANY);
+            let Finds { possible, certain, next } = flight.look::<S::F16, M>(ways.words, way.word(), A::ANY);
             waiting.exits[top] = way.further(next).0;
             flight.top -= u32::from(next == 0);
             let ends = A::ANY & certain;
@@ -129,7 +129,7 @@ fn fly<S: Simd, M: Mode, A: OfFlights>(
         // Those who found something, and may be nearer to their ends.
         while let Some(k) = found.pop() {
             let (flight, waiting) = (&mut flights[k], &mut stacks[k]);
-            if flight.is_full() {
+            if flight.list.is_full() {
                 flight.settle::<M>(records, &rays[flight.ray as usize]);
             }
             if !A::ANY {

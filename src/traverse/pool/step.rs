@@ -48,6 +48,34 @@ impl Slabs {
     }
 }
 
+/// The same with each number in every lane: a ray that goes through many nodes on end spreads it once.
+#[derive(Clone, Copy)]
+pub struct Spread<L> {
+    pub inverse: [L; 3],
+    pub near: [L; 3],
+    pub far: [L; 3],
+    pub octant: usize,
+}
+
+impl<L: Eight> Spread<L> {
+    /// Of the slabs of a ray.
+    #[inline(always)]
+    pub fn new(slabs: &Slabs) -> Self {
+        Self {
+            inverse: spread(&slabs.inverse),
+            near: spread(&slabs.near),
+            far: spread(&slabs.far),
+            octant: slabs.octant as usize,
+        }
+    }
+}
+
+/// Each of the first three numbers in every lane.
+#[inline(always)]
+pub fn spread<L: Eight, const N: usize>(numbers: &[f32; N]) -> [L; 3] {
+    [L::splat(numbers[0]), L::splat(numbers[1]), L::splat(numbers[2])]
+}
+
 /// What is added for the near faces and for the far faces across an axis.
 #[inline(always)]
 pub fn thick<const W: usize, L: Lanes<W>>(origin: L, inverse: L, margin: L) -> [L; 2] {
@@ -69,7 +97,7 @@ pub fn step<L: Eight>(
     any: bool,
 ) -> (usize, Way) {
     let node = &nodes[way.node()];
-    let met = meet::<L>(node, ray, tnear, tfar, any);
+    let met = meet(node, &Spread::<L>::new(ray), L::splat(tnear), L::splat(tfar), any);
     let count = met.put(waiting, top, any);
     // What is on top now is known before it can be read there.
     let before = waiting.exits[top - 1];
@@ -84,7 +112,7 @@ pub struct Met<L: Eight> {
     /// The way to what is in each lane's box.
     pub ways: L::Ids,
     /// Which box each lane is, in four bits each, unless they are as the node has them.
-    nibbles: u32,
+    pub nibbles: u32,
     /// Where the ray enters it.
     pub enters: L,
     /// A bit for each that the ray goes into.
@@ -104,34 +132,43 @@ impl<L: Eight> Met<L> {
     }
 }
 
-/// Has a ray meet a node's boxes between its ends. With `any` they stay in the order that the node has them in.
+/// Where a ray enters a node's boxes, between its ends, and where it leaves them: those it goes into that it enters first.
 #[inline(always)]
-pub fn meet<L: Eight>(node: &Boxes, ray: &Slabs, tnear: f32, tfar: f32, any: bool) -> Met<L> {
-    let Boxes { faces: [x, y, z], orders, .. } = node;
-    // Where the ray enters each box, and where it leaves it.
-    let octant = ray.octant as usize;
+pub fn cross<L: Eight>(node: &Boxes, ray: &Spread<L>, tnear: L, tfar: L) -> [L; 2] {
+    let [x, y, z] = &node.faces;
+    let Spread { inverse, near, far, octant } = *ray;
     let [down_x, down_y, down_z] = [octant & 1, octant >> 1 & 1, octant >> 2 & 1];
-    let [inverse_x, inverse_y, inverse_z] = ray.inverse.map(L::splat);
-    let enters_x = L::load(&x[down_x]).mul_add(inverse_x, L::splat(ray.near[0]));
-    let enters_y = L::load(&y[down_y]).mul_add(inverse_y, L::splat(ray.near[1]));
-    let enters_z = L::load(&z[down_z]).mul_add(inverse_z, L::splat(ray.near[2]));
-    let leaves_x = L::load(&x[down_x ^ 1]).mul_add(inverse_x, L::splat(ray.far[0]));
-    let leaves_y = L::load(&y[down_y ^ 1]).mul_add(inverse_y, L::splat(ray.far[1]));
-    let leaves_z = L::load(&z[down_z ^ 1]).mul_add(inverse_z, L::splat(ray.far[2]));
+    let enters_x = L::load(&x[down_x]).mul_add(inverse[0], near[0]);
+    let enters_y = L::load(&y[down_y]).mul_add(inverse[1], near[1]);
+    let enters_z = L::load(&z[down_z]).mul_add(inverse[2], near[2]);
+    let leaves_x = L::load(&x[down_x ^ 1]).mul_add(inverse[0], far[0]);
+    let leaves_y = L::load(&y[down_y ^ 1]).mul_add(inverse[1], far[1]);
+    let leaves_z = L::load(&z[down_z ^ 1]).mul_add(inverse[2], far[2]);
     // (`max` and `min` keep a NaN that stands on their right.)
-    let enters = enters_x.max(enters_y).max(enters_z.max(L::splat(tnear)));
-    let leaves = leaves_x.min(leaves_y).min(leaves_z.min(L::splat(tfar)));
+    let enters = enters_x.max(enters_y).max(enters_z.max(tnear));
+    let leaves = leaves_x.min(leaves_y).min(leaves_z.min(tfar));
+    [enters, leaves]
+}
 
-    let ways = L::ids_load(&node.ways);
-    if any {
-        return Met { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
-    }
-    // The farthest first.
-    let nibbles = orders[octant & 7];
+/// The boxes of a node in the order in which a ray comes to them, given where it enters and leaves those that the node has.
+#[inline(always)]
+pub fn in_order<L: Eight>(node: &Boxes, octant: usize, [enters, leaves]: [L; 2]) -> Met<L> {
+    let nibbles = node.orders[octant & 7];
     let order = L::ids_nibbles(nibbles);
     let (enters, leaves) = (enters.pick(order), leaves.pick(order));
-    let ways = L::ids_pick(ways, order);
+    let ways = L::ids_pick(L::ids_load(&node.ways), order);
     Met { ways, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
+}
+
+/// Has a ray meet a node's boxes between its ends. With `any` they stay in the order that the node has them in.
+#[inline(always)]
+pub fn meet<L: Eight>(node: &Boxes, ray: &Spread<L>, tnear: L, tfar: L, any: bool) -> Met<L> {
+    let [enters, leaves] = cross(node, ray, tnear, tfar);
+    if any {
+        let ways = L::ids_load(&node.ways);
+        return Met { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
+    }
+    in_order(node, ray.octant, [enters, leaves])
 }
 
 #[cfg(test)]

@@ -26,13 +26,13 @@ pub struct Crossing {
 
 /// The deepest stack of a ray: of the eight exits of each line, or boxes of each node, on a way of
 /// [`crate::kdtree::MAX_DEPTH`] levels all but one wait, and the end of the walk does; and room for eight to be written
-/// at once. (A line is three levels, a node of boxes can be one.) A ray that takes two things off its stack at a time has some
+/// at once. (A line is three levels, a node of boxes can be one.) A ray that goes through two nodes at a time has some
 /// more room to do so.
 const DEPTH: usize = (crate::kdtree::MAX_DEPTH * 7 + 2 + 8 + IN_PAIRS + 16).next_multiple_of(16);
 
-/// The highest place from below which a ray may take two things off its stack at a time. They leave sixteen at most, so that no
-/// more than so many and sixteen are there when it goes on one at a time; and from then on, until it is down here again, no
-/// more than seven wait for each level, on top of those.
+/// The highest place up to which a ray that comes by itself goes through the node there as well as through the one that is nearer. That
+/// leaves seven more at most; and from there on, until it is down here again, no more than seven wait for each level, on top of
+/// those.
 pub const IN_PAIRS: usize = 16;
 
 /// What waits for a ray: exits, and its intervals in them.
