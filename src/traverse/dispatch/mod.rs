@@ -8,8 +8,9 @@
 //! first of its kind, at that [place](Places). Only time hangs on the choice: hits are the same, bit for bit.
 //!
 //! It is chosen up to three times. A *lot* of four squares may go as lists of rays; if it does not, as one wide beam, where squares go
-//! best as beams. Which is better is learnt from what lots have cost either way, and of wide beams from what the same lots did. If a lot does neither, each of its squares is chosen for by
-//! itself, as triangles as small as pixels want it. Of some lots at once, a *field*, all go as one list that are left when a list's turn comes.
+//! best as beams. Lists are compared with beams by what lots have cost either way, wide beams with squares by what the same
+//! lots have cost both ways ([`duel`]). If a lot does neither, each of its squares is chosen for by itself, as triangles as small as pixels
+//! want it. Of some lots at once, a *field*, all go as one list that are left when a list's turn comes.
 //!
 //! What a choice costs counts where rays take 10 ns. So where squares go best as beams, or there is next to nothing to be met, and
 //! nothing else is to be tried, a lot's squares are timed together.

@@ -12,7 +12,7 @@
 //!  fetch:  node   chunk  \-> found: shortened ------>^                                              records  the next starts
 //! ```
 //!
-//! A ray that comes by itself goes the same way, two steps at a time, and nobody else does meanwhile ([`alone`]).
+//! A ray that comes by itself goes through the same nodes and chunks, with nobody else in flight ([`alone`]).
 //!
 //! Hits are those of the other kernels, to the bit. Only the modes whose test is told ahead by
 //! [`Pooled`](crate::geometry::triangle::pooled::Pooled) have this kernel: watertight and exact.
