@@ -99,7 +99,7 @@ fn ready<S: Simd>(ray: &Ray, bounds: &Aabb) -> Option<Spread<S::F8>> {
     })
 }
 
-/// The greater of two numbers. (The standard library's takes thrice as long, to be right of NaNs.)
+/// The greater of two numbers. (The standard library's takes three instructions, to be right of NaNs.)
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     Lanes::<1>::max(a, b)
