@@ -127,7 +127,7 @@ impl<const WAYS: usize> Default for Choice<WAYS> {
 impl<const WAYS: usize> Choice<WAYS> {
     /// Never takes a way from now on.
     pub fn leave_out(&mut self, way: usize) {
-        if self.is_out(way) {
+        if self.out[way] {
             return;
         }
         self.out[way] = true;
@@ -136,13 +136,9 @@ impl<const WAYS: usize> Choice<WAYS> {
         }
     }
 
-    fn is_out(&self, way: usize) -> bool {
-        self.out[way]
-    }
-
     /// Those that are not left out.
     fn ways(&self) -> impl Iterator<Item = usize> {
-        (0..WAYS).filter(|&way| !self.is_out(way))
+        (0..WAYS).filter(|&way| !self.out[way])
     }
 
     /// The way for the next lot.

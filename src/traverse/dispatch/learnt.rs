@@ -6,8 +6,8 @@ use super::choice::{Choice, cost_of};
 use super::duel::{Duel, Turn};
 use super::places::Costs;
 use super::{
-    BEAM, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, leave_out_halves,
-    recorded, timed,
+    BEAM, FRUGAL, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, leave_out_halves,
+    recorded,
 };
 use crate::traverse::accel::Accel;
 use crate::traverse::kernel::Kernel;
@@ -167,7 +167,32 @@ fn by_squares<Q: Question>(
         return;
     }
     for (square, place) in lot.squares().zip(places.chain(std::iter::repeat(None))) {
-        timed(accel, &WAYS, choice, place, count(square.1), |kernel| trace(kernel, square));
+        timed(accel, choice, place, count(square.1), |kernel| trace(kernel, square));
+    }
+}
+
+/// Has a square's rays traced, so many, by the kernel that is quickest at its place, and takes note of how long that took.
+#[inline(always)]
+fn timed(
+    accel: &Accel,
+    choice: &mut Choice<{ WAYS.len() }>,
+    place: Option<&Costs<{ WAYS.len() }>>,
+    rays: usize,
+    trace: impl FnOnce(Kernel),
+) {
+    if accel.cached().is_some_and(|cached| cached.is_short()) {
+        return trace(WAYS[FRUGAL]);
+    }
+    if rays < LEAST_RAYS {
+        return trace(WAYS[choice.quickest()]);
+    }
+    let way = match place {
+        Some(costs) => choice.next_at(&costs.known()),
+        None => choice.next(),
+    };
+    let cost = recorded(accel, choice, way, rays, || trace(WAYS[way]));
+    if let (Some(costs), Some(cost)) = (place, cost) {
+        costs.record(way, cost);
     }
 }
 

@@ -40,7 +40,6 @@ use crate::simd::Isa;
 use asked::{Any, Asked, Closest};
 use choice::Choice;
 use learnt::Learnt;
-use places::Costs;
 
 /// The kernels that it chooses among for a square of sixteen packets.
 const WAYS: [Kernel; 3] = [Kernel::Tile, Kernel::Packet16, Kernel::Packet8];
@@ -124,36 +123,6 @@ fn leave_out_halves<const N: usize>(accel: &Accel, ways: &[Kernel; N], choice: &
     {
         choice.leave_out(halves);
     }
-}
-
-/// Has a kernel trace so many rays of a place, and takes note of how long that took. Gives the way, and the logarithm of the
-/// nanoseconds that a ray took, if note was taken.
-#[inline(always)]
-fn timed<const N: usize>(
-    accel: &Accel,
-    ways: &[Kernel; N],
-    choice: &mut Choice<N>,
-    place: Option<&Costs<N>>,
-    rays: usize,
-    trace: impl FnOnce(Kernel),
-) -> Option<(usize, f32)> {
-    if accel.cached().is_some_and(|cached| cached.is_short()) {
-        trace(ways[FRUGAL]);
-        return None;
-    }
-    if rays < LEAST_RAYS {
-        trace(ways[choice.quickest()]);
-        return None;
-    }
-    let way = match place {
-        Some(costs) => choice.next_at(&costs.known()),
-        None => choice.next(),
-    };
-    let cost = recorded(accel, choice, way, rays, || trace(ways[way]))?;
-    if let Some(costs) = place {
-        costs.record(way, cost);
-    }
-    Some((way, cost))
 }
 
 /// Has a way trace so many rays, and takes note of how long that took.

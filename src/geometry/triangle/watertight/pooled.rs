@@ -25,8 +25,7 @@
 //! all but for the smallest floats: each by itself that is less than `2^-149`, and the bounds allow for `TINY` more.
 
 use super::{Shear, edges, one_sign};
-use crate::geometry::Ray;
-use crate::geometry::triangle::{Lanes3, Mode, RENAMED, Test};
+use crate::geometry::triangle::{Lanes3, RENAMED, Test};
 use crate::simd::{Eight, Lanes, Mask, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
@@ -93,31 +92,12 @@ impl Pooled {
     /// That of no ray.
     pub const NONE: Self = Self { origin: [0.0; 3], shear: [0.0; 3], axes: [0; 4], speed: 0.0 };
 
-    /// Prepares a ray, of which only the first three numbers of each four count.
+    /// Prepares a ray.
     #[inline(always)]
-    pub fn new(origin: &[f32; 4], direction: &[f32; 4]) -> Self {
-        // As in `Shear::new`, to the bit.
-        let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
-        let (is_x, is_y) = ((y <= x) & (z <= x), z <= y);
-        let axis = usize::from(!is_x) * (2 - usize::from(is_y));
-        let [i, j, k] = RENAMED[axis].map(|axis| axis & 3);
-        let along = direction[k];
-        let shear = [direction[i] / along, direction[j] / along, 1.0 / along];
-        Self {
-            origin: [origin[i], origin[j], origin[k]],
-            shear,
-            axes: [i as u8, j as u8, k as u8, 0],
-            speed: speed(shear[2]),
-        }
-    }
-
-    /// The ray prepared for the test of a mode that is told ahead here.
-    #[inline(always)]
-    pub fn test<M: Mode>(&self, ray: &Ray) -> M::Alone {
-        let axis = usize::from(self.axes[2]) % 3;
-        let direction = ray.direction.to_array();
-        let kept = M::Alone::keep([self.shear[0], self.shear[1]], direction[axis]);
-        M::Alone::revive(&kept, &ray.origin.to_array(), &direction, axis)
+    pub fn new(origin: &[f32; 3], direction: &[f32; 3]) -> Self {
+        let Shear { origin, shear, major, .. } = Shear::<1, f32>::new(origin, direction, 1);
+        let [i, j, k] = RENAMED[major.unwrap_or(2)].map(|axis| axis as u8);
+        Self { origin, shear, axes: [i, j, k, 0], speed: speed(shear[2]) }
     }
 
     /// Which of the coordinates `x`, `y` and `z` take the places of those.

@@ -93,10 +93,7 @@ fn check(origin: [f32; 3], direction: [f32; 3], corners: &[Corners; 5], ends: [f
             rows[axis][number] = vertex[axis];
         }
     }
-    let pooled = Pooled::new(
-        &[origin[0], origin[1], origin[2], 0.0],
-        &[direction[0], direction[1], direction[2], 0.0],
-    );
+    let pooled = Pooled::new(&origin, &direction);
     // Again and again, so that there are some in both halves.
     let numbers: [u16; 16] = from_fn(|i| {
         let first = 3 * (i as u16 % 5);
