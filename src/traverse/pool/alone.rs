@@ -3,7 +3,7 @@
 //! At each node and at each chunk it looks at what it would in a [stream](super), but nobody has other work to do while a step
 //! waits for the one before it. So all that it knows of itself stays in registers, and it goes on by branches where a stream
 //! goes on by arithmetic: a processor that foresees which way a ray takes has the next node at work before the mask of this one is known.
-//! Where one box alone is entered, as at most nodes, there is nothing to be put in order, nor on a stack.
+//! Where one box alone is entered, as at a quarter to seven tenths of the nodes, there is nothing to be put in order, nor on a stack.
 //!
 //! Where several are, what is in the nearest one comes next, and what is in the second nearest *at the same time*, if that is a node: neither
 //! asks anything of the other. (Hardly any of that is for nothing, as nearly all that is put on a stack is visited in the end.) A
@@ -14,17 +14,16 @@
 
 use super::answers::OfFlights;
 use super::list::{List, Looking};
-use super::step::{Met, Spread, cross, in_order, meet, spread, thick};
+use super::step::{Met, Slabs, Spread, cross, meet};
 use super::ways::{Ways, look};
+use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
 use crate::geometry::triangle::pooled::Pooled;
-use crate::geometry::{Aabb, Ray};
-use crate::kdtree::{Boxes, Chunk, Pools, Tree, Way};
-use crate::simd::{Eight, Lanes, Mask, Simd};
-use crate::traverse::range::{LEAST, LIMIT};
+use crate::kdtree::{Chunk, Pools, Tree, Way};
+use crate::simd::{Lanes, Mask, Simd};
+use crate::traverse::ready::Ready;
 use crate::traverse::records::Resident;
-use crate::traverse::stream::step::{IN_PAIRS, Waiting, eight};
-use crate::traverse::walk::{FLATTEST, MARGIN};
+use crate::traverse::stream::step::{IN_PAIRS, Waiting};
 
 /// Traces a ray, and gives an answer for ray 0.
 #[inline(always)]
@@ -35,18 +34,19 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     waiting: &mut Waiting,
     answers: &mut A,
 ) {
-    let Resident { tree, records } = *resident;
-    let slabs = if tree.scale().is_none() { ready::<S>(ray, tree.bounds()) } else { None };
-    let Some(slabs) = slabs else { return answers.odd::<M>(resident, 0, ray) };
-    let [origin, direction] = fours(ray);
+    let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+    let ready = Ready::<f32>::new::<1>(&origin, &direction, ray.tnear, ray.tfar, resident.tree.bounds());
+    if ready.ordinary == 0 || !resident.tree.scale().is_none() {
+        return answers.odd::<M>(resident, 0, ray);
+    }
     let mut list = List::NONE;
     let mut walk = Walk::<S, M> {
         resident,
         ways: Ways::new(pools),
         ray,
-        slabs,
-        pooled: Pooled::new(origin, direction),
-        tfar: f32::MAX.min(ray.tfar),
+        slabs: Spread::new(&Slabs::new(&origin, &ready.inverse, &ready.margin)),
+        pooled: Pooled::new(&origin, &direction),
+        tfar: ready.closest,
         list: &mut list,
         waiting,
         top: 0,
@@ -56,53 +56,9 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     } else if walk.list.is_empty() {
         answers.missed(0);
     } else {
-        let test = walk.pooled.test::<M>(ray);
-        answers.decide::<M>(resident, 0, walk.list.nearest::<M>(&test, records, ray, walk.tfar));
+        let nearest = walk.list.nearest::<M>(&M::alone(ray), resident.records, ray, walk.tfar);
+        answers.decide::<M>(resident, 0, nearest);
     }
-}
-
-/// A ray's origin and `tnear`, and its direction and `tfar`.
-#[inline(always)]
-fn fours(ray: &Ray) -> &[[f32; 4]; 2] {
-    bytemuck::cast_ref(ray)
-}
-
-/// A ray as boxes see it, unless its numbers lie near the ends of the floats' range; a NaN anywhere does. It is what
-/// [`Ready`](crate::traverse::ready::Ready) makes of it, with coordinates side by side.
-#[inline(always)]
-fn ready<S: Simd>(ray: &Ray, bounds: &Aabb) -> Option<Spread<S::F8>> {
-    let [from, along] = fours(ray);
-    let (origin, direction) = (S::F4::load(from), S::F4::load(along));
-    let speed = direction.abs();
-    let longest = greater(along[0].abs(), greater(along[1].abs(), along[2].abs()));
-    // What is compared with a NaN is not ordinary. (The fourth numbers are the ray's ends.)
-    let ordinary = speed.lt(S::F4::splat(LIMIT)) & origin.abs().le(S::F4::splat(f32::MAX));
-    if !(ordinary.bits() & 0b111 == 0b111 && LEAST <= longest && ray.tnear <= ray.tfar) {
-        return None;
-    }
-    let inverse = S::F4::splat(1.0) / S::F4::splat(longest * FLATTEST).max(speed).copysign(direction);
-    let mut reach = 0.0;
-    for axis in 0..3 {
-        let to_low = (bounds.min[axis] - from[axis]).abs();
-        let to_high = (bounds.max[axis] - from[axis]).abs();
-        reach = greater(greater(to_low, to_high), reach);
-    }
-    let margin = S::F4::splat(reach * MARGIN) * inverse.abs();
-    let [near, far] = thick(origin, inverse, margin);
-    let octant = inverse.lt(S::F4::splat(0.0)).bits() & 0b111;
-    let [inverse, near, far] = [inverse.store(), near.store(), far.store()];
-    Some(Spread {
-        inverse: spread(&inverse),
-        near: spread(&near),
-        far: spread(&far),
-        octant: octant as usize,
-    })
-}
-
-/// The greater of two numbers. (The standard library's takes three instructions, to be right of NaNs.)
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    Lanes::<1>::max(a, b)
 }
 
 /// A ray on its way.
@@ -178,35 +134,27 @@ impl<S: Simd, M: Mode> Walk<'_, '_, S, M> {
         false
     }
 
-    /// Goes through a node, and puts on the stack what is behind the nearest box. The way to what is in that, if any is entered.
+    /// Goes through a node, and puts on the stack what is behind the nearest box, or behind any, if any hit will do. The way to what is in
+    /// that, if any is entered.
     #[inline(always)]
     fn go_through<A: OfFlights>(&mut self, way: Way) -> Option<Way> {
         let node = &self.ways.nodes[way.node()];
-        let crossed = self.cross(node);
-        let bits = crossed[0].le(crossed[1]).bits() & 0xff;
-        if bits == 0 {
+        let [tnear, tfar] = self.ends();
+        let crossed = cross(node, &self.slabs, tnear, tfar);
+        let entered = crossed[0].le(crossed[1]).bits() & 0xff;
+        if entered == 0 {
             return None;
         }
-        let behind = bits & (bits - 1);
-        if behind == 0 {
-            return Some(Way(node.ways[bits.trailing_zeros() as usize & 7]));
+        if entered.is_power_of_two() {
+            return Some(Way(node.ways[entered.trailing_zeros() as usize & 7]));
         }
-        if A::ANY {
-            // Whichever comes first.
-            S::F8::ids_compact(S::F8::ids_load(&node.ways), behind, self.free_ways());
-            self.top += behind.count_ones() as usize;
-            self.second::<A>(Way(node.ways[(behind | 1).ilog2() as usize & 7]));
-            return Some(Way(node.ways[bits.trailing_zeros() as usize & 7]));
-        }
-        let Met { ways, enters, nibbles, bits } = in_order(node, self.slabs.octant, crossed);
-        let way_of = |lane: u32| Way(node.ways[(nibbles >> (4 * lane)) as usize & 7]);
-        let nearest = (bits | 1).ilog2();
-        let behind = bits ^ 1 << nearest;
-        S::F8::ids_compact(ways, behind, self.free_ways());
-        enters.compact(behind, eight(&mut self.waiting.tmin, self.top + 1));
-        self.top += behind.count_ones() as usize;
-        self.second::<A>(way_of((behind | 1).ilog2()));
-        Some(way_of(nearest))
+        let mut met = Met::new(node, self.slabs.octant, crossed, A::ANY);
+        // (Of those that are in no order, the first is as good as any.)
+        let nearest = if A::ANY { met.bits.trailing_zeros() } else { met.last() };
+        met.bits ^= 1 << nearest;
+        self.top += met.put(self.waiting, self.top + 1, A::ANY);
+        self.second::<A>(met.way(node, met.last(), A::ANY));
+        Some(met.way(node, nearest, A::ANY))
     }
 
     /// Goes through the node that is on top of the stack, whose way this is, and puts there what is in it. What is no node, or is there
@@ -217,22 +165,16 @@ impl<S: Simd, M: Mode> Walk<'_, '_, S, M> {
             self.ways.fetch(way.0);
             return;
         }
-        let node = &self.ways.nodes[way.node()];
-        let [tnear, tfar] = [S::F8::splat(self.ray.tnear), S::F8::splat(self.tfar)];
-        let met = meet(node, &self.slabs, tnear, tfar, A::ANY);
+        let [tnear, tfar] = self.ends();
+        let met = meet(&self.ways.nodes[way.node()], &self.slabs, tnear, tfar, A::ANY);
         self.top += met.put(self.waiting, self.top, A::ANY);
         self.top -= 1;
     }
 
+    /// Its ends, in all lanes.
     #[inline(always)]
-    fn cross(&self, node: &Boxes) -> [S::F8; 2] {
-        cross(node, &self.slabs, S::F8::splat(self.ray.tnear), S::F8::splat(self.tfar))
-    }
-
-    /// Room for eight ways on the stack.
-    #[inline(always)]
-    fn free_ways(&mut self) -> &mut [i32; 8] {
-        eight(&mut self.waiting.exits, self.top + 1)
+    fn ends(&self) -> [S::F8; 2] {
+        [S::F8::splat(self.ray.tnear), S::F8::splat(self.tfar)]
     }
 }
 

@@ -51,9 +51,9 @@ impl Slabs {
 /// The same with each number in every lane: a ray that goes through many nodes on end spreads it once.
 #[derive(Clone, Copy)]
 pub struct Spread<L> {
-    pub inverse: [L; 3],
-    pub near: [L; 3],
-    pub far: [L; 3],
+    inverse: [L; 3],
+    near: [L; 3],
+    far: [L; 3],
     pub octant: usize,
 }
 
@@ -70,10 +70,10 @@ impl<L: Eight> Spread<L> {
     }
 }
 
-/// Each of the first three numbers in every lane.
+/// Each of three numbers in every lane.
 #[inline(always)]
-pub fn spread<L: Eight, const N: usize>(numbers: &[f32; N]) -> [L; 3] {
-    [L::splat(numbers[0]), L::splat(numbers[1]), L::splat(numbers[2])]
+fn spread<L: Eight>([x, y, z]: &[f32; 3]) -> [L; 3] {
+    [L::splat(*x), L::splat(*y), L::splat(*z)]
 }
 
 /// What is added for the near faces and for the far faces across an axis.
@@ -101,9 +101,7 @@ pub fn step<L: Eight>(
     let count = met.put(waiting, top, any);
     // What is on top now is known before it can be read there.
     let before = waiting.exits[top - 1];
-    let last = (met.bits | 1).ilog2();
-    let next = node.ways[if any { last & 7 } else { met.nibbles >> (4 * last) & 7 } as usize];
-    let way = select_unpredictable(count == 0, before, next);
+    let way = select_unpredictable(count == 0, before, met.way(node, met.last(), any).0);
     (top + count - 1, Way(way))
 }
 
@@ -112,7 +110,7 @@ pub struct Met<L: Eight> {
     /// The way to what is in each lane's box.
     pub ways: L::Ids,
     /// Which box each lane is, in four bits each, unless they are as the node has them.
-    pub nibbles: u32,
+    nibbles: u32,
     /// Where the ray enters it.
     pub enters: L,
     /// A bit for each that the ray goes into.
@@ -120,6 +118,34 @@ pub struct Met<L: Eight> {
 }
 
 impl<L: Eight> Met<L> {
+    /// Those of a node, given where a ray into an octant enters each of its boxes and leaves it. With `any` they stay in the order that the
+    /// node has them in.
+    #[inline(always)]
+    pub fn new(node: &Boxes, octant: usize, [enters, leaves]: [L; 2], any: bool) -> Self {
+        let ways = L::ids_load(&node.ways);
+        if any {
+            return Self { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
+        }
+        // The farthest first.
+        let nibbles = node.orders[octant & 7];
+        let order = L::ids_nibbles(nibbles);
+        let (enters, leaves) = (enters.pick(order), leaves.pick(order));
+        let ways = L::ids_pick(ways, order);
+        Self { ways, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
+    }
+
+    /// The last lane whose box the ray goes into. (If it goes into none, it means nothing.)
+    #[inline(always)]
+    pub fn last(&self) -> u32 {
+        (self.bits | 1).ilog2()
+    }
+
+    /// The way to what is in a lane's box.
+    #[inline(always)]
+    pub fn way(&self, node: &Boxes, lane: u32, any: bool) -> Way {
+        Way(node.ways[if any { lane & 7 } else { self.nibbles >> (4 * lane) & 7 } as usize])
+    }
+
     /// Puts those that the ray goes into on a stack, from a place on, and where it enters them unless it asks for `any` hit; how many
     /// they are.
     #[inline(always)]
@@ -150,25 +176,10 @@ pub fn cross<L: Eight>(node: &Boxes, ray: &Spread<L>, tnear: L, tfar: L) -> [L; 
     [enters, leaves]
 }
 
-/// The boxes of a node in the order in which a ray comes to them, given where it enters and leaves those that the node has.
-#[inline(always)]
-pub fn in_order<L: Eight>(node: &Boxes, octant: usize, [enters, leaves]: [L; 2]) -> Met<L> {
-    let nibbles = node.orders[octant & 7];
-    let order = L::ids_nibbles(nibbles);
-    let (enters, leaves) = (enters.pick(order), leaves.pick(order));
-    let ways = L::ids_pick(L::ids_load(&node.ways), order);
-    Met { ways, nibbles, enters, bits: enters.le(leaves).bits() & 0xff }
-}
-
 /// Has a ray meet a node's boxes between its ends. With `any` they stay in the order that the node has them in.
 #[inline(always)]
 pub fn meet<L: Eight>(node: &Boxes, ray: &Spread<L>, tnear: L, tfar: L, any: bool) -> Met<L> {
-    let [enters, leaves] = cross(node, ray, tnear, tfar);
-    if any {
-        let ways = L::ids_load(&node.ways);
-        return Met { ways, nibbles: 0, enters, bits: enters.le(leaves).bits() & 0xff };
-    }
-    in_order(node, ray.octant, [enters, leaves])
+    Met::new(node, ray.octant, cross(node, ray, tnear, tfar), any)
 }
 
 #[cfg(test)]
