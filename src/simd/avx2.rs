@@ -219,6 +219,15 @@ impl Eight for F32x8 {
         Self(avx!(_mm256_permutevar_ps(self.0, ids)))
     }
     #[inline(always)]
+    fn splat_in_fours<const I: usize>(self) -> Self {
+        Self(avx!(match I & 3 {
+            0 => _mm256_permute_ps::<0x00>(self.0),
+            1 => _mm256_permute_ps::<0x55>(self.0),
+            2 => _mm256_permute_ps::<0xaa>(self.0),
+            _ => _mm256_permute_ps::<0xff>(self.0),
+        }))
+    }
+    #[inline(always)]
     fn pick(self, ids: __m256i) -> Self {
         Self(avx!(_mm256_permutevar8x32_ps(self.0, ids)))
     }

@@ -28,6 +28,14 @@ pub trait Eight: Lanes<8> {
         Self::load(&picked)
     }
 
+    /// Lane `I` of each half in all lanes of that half.
+    #[inline(always)]
+    fn splat_in_fours<const I: usize>(self) -> Self {
+        let values = self.store();
+        let (low, high) = (values[I & 3], values[I & 3 | 4]);
+        Self::load(&[low, low, low, low, high, high, high, high])
+    }
+
     /// Lane `i` becomes lane `ids[i] & 7`.
     #[inline(always)]
     fn pick(self, ids: Self::Ids) -> Self {

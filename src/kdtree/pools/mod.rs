@@ -39,6 +39,8 @@ pub struct Pools {
     words: Column<u32>,
     /// Up to how many triangles leaves mostly have.
     most: usize,
+    /// The corners of the box around all of them, and a fourth number that says nothing.
+    corners: [[f32; 4]; 2],
 }
 
 impl Pools {
@@ -52,7 +54,7 @@ impl Pools {
         if words.len() > MAX_WORD {
             return None;
         }
-        Some(Self { nodes: boxes::pack(&nodes, &boxes, &shares).into(), words: words.into(), most })
+        Some(Self::with_corners(boxes::pack(&nodes, &boxes, &shares).into(), words.into(), most))
     }
 
     /// Those of arrays that were theirs before, whose leaves mostly have up to `most` triangles.
@@ -72,7 +74,24 @@ impl Pools {
         if most == 0 || most > MOST {
             return Err(format!("leaves of pools have up to {MOST} triangles, not {most}"));
         }
-        Ok(Self { nodes, words, most })
+        Ok(Self::with_corners(nodes, words, most))
+    }
+
+    /// The same with the box around all of them, which is what the root's boxes are in.
+    fn with_corners(nodes: Column<Boxes>, words: Column<u32>, most: usize) -> Self {
+        let mut corners = [[0.0; 4]; 2];
+        for axis in 0..3 {
+            let [least, greatest] = &nodes[0].faces[axis];
+            corners[0][axis] = least.iter().copied().fold(f32::INFINITY, f32::min);
+            corners[1][axis] = greatest.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        }
+        Self { nodes, words, most, corners }
+    }
+
+    /// The corners of the box around all triangles, and a fourth number that says nothing.
+    #[inline(always)]
+    pub const fn corners(&self) -> &[[f32; 4]; 2] {
+        &self.corners
     }
 
     /// Up to how many triangles leaves mostly have: as many as kernels meet at once, where they were made.

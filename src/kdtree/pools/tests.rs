@@ -135,7 +135,8 @@ fn a_leaf_of_many_triangles_is_a_row_of_chunks() {
         let chunks = chunk::count(&ids, &triangles);
         assert_eq!(chunks, ids.len().div_ceil(most));
         words.resize(words.len() + chunk::SPAN, 0);
-        let pools = Pools { nodes: Vec::new().into(), words: words.into(), most: MOST };
+        let pools =
+            Pools { nodes: Vec::new().into(), words: words.into(), most: MOST, corners: [[0.0; 4]; 2] };
         let found = leaf(&pools, 3);
         assert_eq!(found.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids);
         for (id, corners) in found {

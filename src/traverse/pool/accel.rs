@@ -1,5 +1,6 @@
 //! Rays through the pools of an [`Accel`].
 
+use super::list::List;
 use super::{OfFlights, alone, trace};
 use crate::error::{Error, Result};
 use crate::geometry::triangle::Mode;
@@ -62,8 +63,8 @@ impl Accel {
     #[inline(never)]
     pub(in crate::traverse) fn intersect_alone(&self, pools: &Pools, ray: &Ray) -> Hit {
         let mut hit = [Hit::MISS];
-        WAITING.with_borrow_mut(|waiting| {
-            self.ask_closed(Alone { pools, ray, waiting, answers: Closest(&mut hit) });
+        WALKED.with_borrow_mut(|(waiting, list)| {
+            self.ask_closed(Alone { pools, ray, waiting, list, answers: Closest(&mut hit) });
         });
         hit[0]
     }
@@ -72,8 +73,8 @@ impl Accel {
     #[inline(never)]
     pub(in crate::traverse) fn occluded_alone(&self, pools: &Pools, ray: &Ray) -> bool {
         let mut occluded = [false];
-        WAITING.with_borrow_mut(|waiting| {
-            self.ask_closed(Alone { pools, ray, waiting, answers: Any(&mut occluded) });
+        WALKED.with_borrow_mut(|(waiting, list)| {
+            self.ask_closed(Alone { pools, ray, waiting, list, answers: Any(&mut occluded) });
         });
         occluded[0]
     }
@@ -105,21 +106,22 @@ impl<A: OfFlights> ResidentQuery for InPools<'_, A> {
 }
 
 thread_local! {
-    /// The stack of a thread's ray. (It is taken here, and not where it is used, as a closure of the library's would be compiled
-    /// without the instruction set.)
-    static WAITING: RefCell<Waiting> = const { RefCell::new(Waiting::new()) };
+    /// The stack of a thread's ray, and its list. (They are taken here, and not where they are used, as a closure of the library's would be
+    /// compiled without the instruction set.)
+    static WALKED: RefCell<(Waiting, List)> = const { RefCell::new((Waiting::new(), List::NONE)) };
 }
 
 struct Alone<'a, A> {
     pools: &'a Pools,
     ray: &'a Ray,
     waiting: &'a mut Waiting,
+    list: &'a mut List,
     answers: A,
 }
 
 impl<A: OfFlights> ResidentQuery for Alone<'_, A> {
     #[inline(always)]
     fn run<S: Simd, M: Mode>(mut self, tree: &Resident<'_, M::Record>) {
-        alone::trace::<S, M, A>(tree, self.pools, self.ray, self.waiting, &mut self.answers);
+        alone::trace::<S, M, A>(tree, self.pools, self.ray, self.waiting, self.list, &mut self.answers);
     }
 }

@@ -14,14 +14,14 @@
 
 use super::answers::OfFlights;
 use super::list::{List, Looking};
-use super::step::{Met, Slabs, Spread, cross, meet};
+use super::prepared::Prepared;
+use super::step::{Met, Spread, cross, meet};
 use super::ways::{Ways, look};
 use crate::geometry::Ray;
 use crate::geometry::triangle::Mode;
 use crate::geometry::triangle::pooled::Pooled;
 use crate::kdtree::{Chunk, Pools, Tree, Way};
 use crate::simd::{Lanes, Mask, Simd};
-use crate::traverse::ready::Ready;
 use crate::traverse::records::Resident;
 use crate::traverse::stream::step::{IN_PAIRS, Waiting};
 
@@ -32,31 +32,21 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     pools: &Pools,
     ray: &Ray,
     waiting: &mut Waiting,
+    list: &mut List,
     answers: &mut A,
 ) {
-    let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
-    let ready = Ready::<f32>::new::<1>(&origin, &direction, ray.tnear, ray.tfar, resident.tree.bounds());
-    if ready.ordinary == 0 || !resident.tree.scale().is_none() {
-        return answers.odd::<M>(resident, 0, ray);
-    }
-    let mut list = List::NONE;
-    let mut walk = Walk::<S, M> {
-        resident,
-        ways: Ways::new(pools),
-        ray,
-        slabs: Spread::new(&Slabs::new(&origin, &ready.inverse, &ready.margin)),
-        pooled: Pooled::new(&origin, &direction),
-        tfar: ready.closest,
-        list: &mut list,
-        waiting,
-        top: 0,
-    };
+    let prepared = if resident.tree.scale().is_none() { Prepared::new(ray, pools.corners()) } else { None };
+    let Some(Prepared { slabs, pooled, tfar }) = prepared else { return answers.odd::<M>(resident, 0, ray) };
+    list.clear();
+    let mut walk =
+        Walk::<S, M> { resident, ways: Ways::new(pools), ray, slabs, pooled, tfar, list, waiting, top: 0 };
     if walk.all::<A>() {
         answers.hits(0);
     } else if walk.list.is_empty() {
         answers.missed(0);
     } else {
-        let nearest = walk.list.nearest::<M>(&M::alone(ray), resident.records, ray, walk.tfar);
+        let test = walk.pooled.test::<M>(ray);
+        let nearest = walk.list.nearest::<M>(&test, resident.records, ray, walk.tfar);
         answers.decide::<M>(resident, 0, nearest);
     }
 }

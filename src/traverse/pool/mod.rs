@@ -22,6 +22,7 @@ mod alone;
 pub mod answers;
 mod flight;
 mod list;
+mod prepared;
 mod start;
 pub mod step;
 pub mod ways;

@@ -1,6 +1,6 @@
 //! Rays made ready, eight together.
 
-use super::step::{Slabs, thick};
+use super::step::{Octant, Slabs, thick};
 use crate::geometry::triangle::pooled::{Pooled, shears, speed};
 use crate::geometry::{Aabb, Ray};
 use crate::simd::{Eight, Mask};
@@ -72,7 +72,7 @@ impl Starts {
             inverse: three(&self.inverse),
             near: three(&self.near),
             far: three(&self.far),
-            octant: self.octants[lane],
+            octant: Octant::new(self.octants[lane]),
         }
     }
 

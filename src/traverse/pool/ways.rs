@@ -2,7 +2,7 @@
 
 use crate::geometry::triangle::Mode;
 use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
-use crate::kdtree::{Boxes, Chunk, Pools, Way};
+use crate::kdtree::{Boxes, Chunk, MOST, Pools, Way};
 use crate::simd::{Dense, Sixteen, prefetch};
 use std::hint::select_unpredictable;
 
@@ -74,15 +74,38 @@ fn look_by<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
         corners: chunk.corners(),
         count: chunk.count(),
     };
-    let (vertices, ids) = (ray.see::<L>(&triangles), chunk.ids());
-    if L::HALVES_PAY {
-        for half in 0..chunk.count().div_ceil(8).min(2) {
-            let found =
-                ray.prospects_of_half::<L, SIGNS, EARLY>(&vertices, &triangles, half, tnear, finder.tfar());
-            finder.take(found, ids[8 * half..].first_chunk().expect("there are two halves"));
-        }
-    } else {
+    let ids = chunk.ids();
+    if !L::HALVES_PAY {
+        let vertices = ray.see::<L>(&triangles);
         let found = ray.prospects::<L, SIGNS, EARLY>(&vertices, &triangles, tnear, finder.tfar());
-        finder.take(found, ids);
+        return finder.take(found, ids);
     }
+    let halves = chunk.count().div_ceil(8).min(2);
+    // Mostly there are few vertices: one register has them then.
+    if chunk.vertices() <= 8 {
+        let vertices = ray.see_eight::<L::Half>(&triangles);
+        for half in 0..halves {
+            let found = ray.prospects_of_few::<L::Half, SIGNS, EARLY>(
+                &vertices,
+                &triangles,
+                half,
+                tnear,
+                finder.tfar(),
+            );
+            finder.take(found, eight_of(ids, half));
+        }
+        return;
+    }
+    let vertices = ray.see::<L>(&triangles);
+    for half in 0..halves {
+        let found =
+            ray.prospects_of_half::<L, SIGNS, EARLY>(&vertices, &triangles, half, tnear, finder.tfar());
+        finder.take(found, eight_of(ids, half));
+    }
+}
+
+/// The first eight, or the last.
+#[inline(always)]
+fn eight_of(ids: &[i32; MOST], half: usize) -> &[i32; 8] {
+    ids[8 * half..].first_chunk().expect("there are two halves")
 }

@@ -25,7 +25,8 @@
 //! all but for the smallest floats: each by itself that is less than `2^-149`, and the bounds allow for `TINY` more.
 
 use super::{Shear, edges, one_sign};
-use crate::geometry::triangle::{Lanes3, RENAMED, Test};
+use crate::geometry::Ray;
+use crate::geometry::triangle::{Lanes3, Mode, RENAMED, Test};
 use crate::simd::{Eight, Lanes, Mask, Sixteen};
 
 /// `64u`, for what does not depend on the triangle.
@@ -88,16 +89,46 @@ pub struct Sixteens<'a> {
     pub count: usize,
 }
 
+impl Sixteens<'_> {
+    /// The numbers of the first, second and third vertices of eight triangles, the first eight or the last.
+    #[inline(always)]
+    fn corners_of_half<L: Eight>(&self, half: usize) -> (L::Ids, L::Ids, L::Ids) {
+        let corners = self.corners[half * 8..].first_chunk().expect("there are two halves");
+        let a = L::ids_widen(corners);
+        (a, L::ids_shift::<4>(a), L::ids_shift::<8>(a))
+    }
+
+    /// How many triangles there are in a half or behind it.
+    #[inline(always)]
+    const fn of_half(&self, half: usize) -> usize {
+        self.count.saturating_sub(half * 8)
+    }
+}
+
 impl Pooled {
     /// That of no ray.
     pub const NONE: Self = Self { origin: [0.0; 3], shear: [0.0; 3], axes: [0; 4], speed: 0.0 };
 
-    /// Prepares a ray.
+    /// Prepares a ray whose greatest axis is known, the first of several, from its origin and its direction, of which a fourth
+    /// number says nothing.
     #[inline(always)]
-    pub fn new(origin: &[f32; 3], direction: &[f32; 3]) -> Self {
-        let Shear { origin, shear, major, .. } = Shear::<1, f32>::new(origin, direction, 1);
-        let [i, j, k] = RENAMED[major.unwrap_or(2)].map(|axis| axis as u8);
-        Self { origin, shear, axes: [i, j, k, 0], speed: speed(shear[2]) }
+    pub fn of_one<L: Eight>(origin: &[f32; 4], direction: &[f32; 4], axis: usize) -> Self {
+        // As in `Shear::new`, to the bit.
+        let [i, j, k] = RENAMED[axis.min(2)];
+        let along = direction[k];
+        let slopes = (L::of_fours([direction, direction]) / L::splat(along)).store();
+        let shear = [slopes[i], slopes[j], 1.0 / along];
+        let origin = [origin[i], origin[j], origin[k]];
+        Self { origin, shear, axes: [i as u8, j as u8, k as u8, 0], speed: along.abs() }
+    }
+
+    /// The ray prepared for the test of a mode that is told ahead here.
+    #[inline(always)]
+    pub fn test<M: Mode>(&self, ray: &Ray) -> M::Alone {
+        let axis = usize::from(self.axes[2]) % 3;
+        let direction = ray.direction.to_array();
+        let kept = M::Alone::keep([self.shear[0], self.shear[1]], direction[axis]);
+        M::Alone::revive(&kept, &ray.origin.to_array(), &direction, axis)
     }
 
     /// Which of the coordinates `x`, `y` and `z` take the places of those.
@@ -125,11 +156,25 @@ impl Pooled {
     #[inline(always)]
     pub fn see<L: Sixteen>(&self, triangles: &Sixteens<'_>) -> Vertices<L> {
         let [i, j, k] = triangles.rows;
+        self.seen::<16, L>([L::load(i), L::load(j), L::load(k)])
+    }
+
+    /// The same of the first eight.
+    #[inline(always)]
+    pub fn see_eight<L: Eight>(&self, triangles: &Sixteens<'_>) -> Vertices<L> {
+        let ([i, j, k], few) = (triangles.rows, "eight of sixteen");
+        let load = [i.first_chunk().expect(few), j.first_chunk().expect(few), k.first_chunk().expect(few)];
+        self.seen::<8, L>([L::load(load[0]), L::load(load[1]), L::load(load[2])])
+    }
+
+    /// Vertices of which the coordinates are given, as the ray sees them.
+    #[inline(always)]
+    fn seen<const W: usize, L: Lanes<W>>(&self, [i, j, k]: Lanes3<L>) -> Vertices<L> {
         let [ox, oy, oz] = self.origin;
         let [sx, sy, scale] = self.shear;
-        let z = L::load(k) - L::splat(oz);
-        let x = (L::load(i) - L::splat(ox)) - L::splat(sx) * z;
-        let y = (L::load(j) - L::splat(oy)) - L::splat(sy) * z;
+        let z = k - L::splat(oz);
+        let x = (i - L::splat(ox)) - L::splat(sx) * z;
+        let y = (j - L::splat(oy)) - L::splat(sy) * z;
         Vertices { x, y, depth: L::splat(scale) * z, size: x.abs() + y.abs() }
     }
 
@@ -165,23 +210,34 @@ impl Pooled {
         tnear: f32,
         tfar: f32,
     ) -> Prospects<8, L::Half> {
-        let first = half * 8;
-        let corners = triangles.corners[first..].first_chunk().expect("there are two halves");
-        let a = L::Half::ids_widen(corners);
-        let (b, c) = (L::Half::ids_shift::<4>(a), L::Half::ids_shift::<8>(a));
+        let (a, b, c) = triangles.corners_of_half::<L::Half>(half);
         let corners = [
             [x.pick_half(a), y.pick_half(a), depth.pick_half(a)],
             [x.pick_half(b), y.pick_half(b), depth.pick_half(b)],
             [x.pick_half(c), y.pick_half(c), depth.pick_half(c)],
         ];
         let size = size.pick_half(a) + size.pick_half(b) + size.pick_half(c);
-        self.between::<8, L::Half, SIGNS, EARLY>(
-            &corners,
-            size,
-            triangles.count.saturating_sub(first),
-            tnear,
-            tfar,
-        )
+        self.between::<8, L::Half, SIGNS, EARLY>(&corners, size, triangles.of_half(half), tnear, tfar)
+    }
+
+    /// The same where there are no more than eight vertices: each corner is one shuffle then, and not two and a choice.
+    #[inline(always)]
+    pub fn prospects_of_few<L: Eight, const SIGNS: bool, const EARLY: bool>(
+        &self,
+        Vertices { x, y, depth, size }: &Vertices<L>,
+        triangles: &Sixteens<'_>,
+        half: usize,
+        tnear: f32,
+        tfar: f32,
+    ) -> Prospects<8, L> {
+        let (a, b, c) = triangles.corners_of_half::<L>(half);
+        let corners = [
+            [x.pick(a), y.pick(a), depth.pick(a)],
+            [x.pick(b), y.pick(b), depth.pick(b)],
+            [x.pick(c), y.pick(c), depth.pick(c)],
+        ];
+        let size = size.pick(a) + size.pick(b) + size.pick(c);
+        self.between::<8, L, SIGNS, EARLY>(&corners, size, triangles.of_half(half), tnear, tfar)
     }
 
     /// What the ray may find in so many triangles of such corners and sizes.

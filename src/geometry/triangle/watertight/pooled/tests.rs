@@ -37,6 +37,15 @@ impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
                 assert_eq!([first, last], [all.2[8 * half + lane], all.3[8 * half + lane]]);
             }
         }
+        // The first two triangles have six vertices.
+        let two = Sixteens { count: 2, ..*triangles };
+        let few = ray.see_eight::<S::F8>(&two);
+        let Prospects { possible, certain, first, last } =
+            ray.prospects_of_few::<S::F8, SIGNS, false>(&few, &two, 0, tnear, tfar);
+        assert_eq!((possible.bits(), certain.bits()), (all.0 & 3, all.1 & 3));
+        for lane in (0..2).filter(|lane| all.0 >> lane & 1 == 1) {
+            assert_eq!([first.store()[lane], last.store()[lane]], [all.2[lane], all.3[lane]]);
+        }
         let ([possible, certain], [first, last]) = ([all.0, all.1], [all.2, all.3]);
         for bits in [possible, certain] {
             (5..16).for_each(|i| assert_eq!(bits >> i & 1, if i < ASKED { bits >> (i % 5) & 1 } else { 0 }));
@@ -83,6 +92,36 @@ impl<const SIGNS: bool> Task for AskListed<'_, SIGNS> {
     }
 }
 
+/// A ray by itself, as every instruction set prepares it, beside what the mode's test makes of it.
+fn prepared(origin: [f32; 3], direction: [f32; 3]) -> Pooled {
+    let test = Shear::<1, f32>::new(&origin, &direction, 1);
+    let axis = test.major.expect("one ray has one greatest axis");
+    for isa in Isa::available() {
+        let fours = [origin, direction].map(|[x, y, z]| [x, y, z, f32::INFINITY]);
+        let of_one = Chosen::new(isa).expect("it is available").run(Prepare(fours, axis));
+        assert_eq!(of_one.renamed(), RENAMED[axis]);
+        assert_eq!(
+            (of_one.origin, of_one.shear),
+            (test.origin, test.shear),
+            "{isa}, {origin:?} {direction:?}"
+        );
+        assert!((of_one.speed / speed(test.shear[2]) - 1.0).abs() < 1e-6, "{isa}, {direction:?}");
+    }
+    Pooled::of_shear(&origin, test.shear, axis)
+}
+
+struct Prepare([[f32; 4]; 2], usize);
+
+impl Task for Prepare {
+    type Output = Pooled;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Pooled {
+        let Self([origin, direction], axis) = self;
+        Pooled::of_one::<S::F8>(&origin, &direction, axis)
+    }
+}
+
 /// Five triangles that share no vertex, asked together and one by one: nothing that is hit is impossible, all that is
 /// certain is hit, and `t` lies between its bounds. How many are hit, and how many of those are certain.
 fn check(origin: [f32; 3], direction: [f32; 3], corners: &[Corners; 5], ends: [f32; 2]) -> [usize; 2] {
@@ -93,7 +132,7 @@ fn check(origin: [f32; 3], direction: [f32; 3], corners: &[Corners; 5], ends: [f
             rows[axis][number] = vertex[axis];
         }
     }
-    let pooled = Pooled::new(&origin, &direction);
+    let pooled = prepared(origin, direction);
     // Again and again, so that there are some in both halves.
     let numbers: [u16; 16] = from_fn(|i| {
         let first = 3 * (i as u16 % 5);
