@@ -95,6 +95,12 @@ fn check_eight<L: Eight>() {
         assert_eq!(turned.store(), std::array::from_fn(|lane| rows[lane & 3][lane & 4 | j]));
     }
 
+    let (first, second) = (x.splat_in_fours::<0>().store(), x.splat_in_fours::<1>().store());
+    let (third, fourth) = (x.splat_in_fours::<2>().store(), x.splat_in_fours::<3>().store());
+    for (place, splat) in [first, second, third, fourth].into_iter().enumerate() {
+        assert_eq!(splat, std::array::from_fn(|lane| a[lane & 4 | place]));
+    }
+
     for bits in 0..256u32 {
         // Numbers beyond the lanes show that only the low bits count.
         let places: [i32; 8] = std::array::from_fn(|i| (bits.wrapping_mul(2654435761) >> (3 * i)) as i32);
