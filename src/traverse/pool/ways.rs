@@ -1,7 +1,9 @@
 //! The way through nodes of boxes and chunks: what is fetched ahead, and what a ray finds in a chunk.
 
 use crate::geometry::triangle::Mode;
-use crate::geometry::triangle::pooled::{Pooled, Prospects, Sixteens};
+use crate::geometry::triangle::pooled::{
+    FromEight, FromSixteen, Picks, Pooled, Prospects, Sixteens, Vertices,
+};
 use crate::kdtree::{Boxes, Chunk, MOST, Pools, Way};
 use crate::simd::{Dense, Sixteen, prefetch};
 use std::hint::select_unpredictable;
@@ -80,32 +82,28 @@ fn look_by<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
         let found = ray.prospects::<L, SIGNS, EARLY>(&vertices, &triangles, tnear, finder.tfar());
         return finder.take(found, ids);
     }
-    let halves = chunk.count().div_ceil(8).min(2);
     // Mostly there are few vertices: one register has them then.
     if chunk.vertices() <= 8 {
         let vertices = ray.see_eight::<L::Half>(&triangles);
-        for half in 0..halves {
-            let found = ray.prospects_of_few::<L::Half, SIGNS, EARLY>(
-                &vertices,
-                &triangles,
-                half,
-                tnear,
-                finder.tfar(),
-            );
-            finder.take(found, eight_of(ids, half));
-        }
-        return;
-    }
-    let vertices = ray.see::<L>(&triangles);
-    for half in 0..halves {
-        let found =
-            ray.prospects_of_half::<L, SIGNS, EARLY>(&vertices, &triangles, half, tnear, finder.tfar());
-        finder.take(found, eight_of(ids, half));
+        look_by_halves::<FromEight, _, SIGNS, EARLY>(ray, &vertices, &triangles, ids, tnear, finder);
+    } else {
+        let vertices = ray.see::<L>(&triangles);
+        look_by_halves::<FromSixteen, _, SIGNS, EARLY>(ray, &vertices, &triangles, ids, tnear, finder);
     }
 }
 
-/// The first eight, or the last.
 #[inline(always)]
-fn eight_of(ids: &[i32; MOST], half: usize) -> &[i32; 8] {
-    ids[8 * half..].first_chunk().expect("there are two halves")
+fn look_by_halves<P: Picks<V>, V: Copy, const SIGNS: bool, const EARLY: bool>(
+    ray: &Pooled,
+    vertices: &Vertices<V>,
+    triangles: &Sixteens<'_>,
+    ids: &[i32; MOST],
+    tnear: f32,
+    finder: &mut impl Finder,
+) {
+    for half in 0..triangles.count.div_ceil(8).min(2) {
+        let tfar = finder.tfar();
+        let found = ray.prospects_of_half::<P, V, SIGNS, EARLY>(vertices, triangles, half, tnear, tfar);
+        finder.take(found, ids[8 * half..].first_chunk().expect("there are two halves"));
+    }
 }

@@ -89,19 +89,37 @@ pub struct Sixteens<'a> {
     pub count: usize,
 }
 
-impl Sixteens<'_> {
-    /// The numbers of the first, second and third vertices of eight triangles, the first eight or the last.
-    #[inline(always)]
-    fn corners_of_half<L: Eight>(&self, half: usize) -> (L::Ids, L::Ids, L::Ids) {
-        let corners = self.corners[half * 8..].first_chunk().expect("there are two halves");
-        let a = L::ids_widen(corners);
-        (a, L::ids_shift::<4>(a), L::ids_shift::<8>(a))
-    }
+/// How numbers of vertices come to the corners of eight triangles. (A trait, as a closure would be compiled without the
+/// instruction set.)
+pub trait Picks<V> {
+    /// Numbers of eight corners.
+    type Corners: Eight;
 
-    /// How many triangles there are in a half or behind it.
+    /// Lane `i` becomes that of the vertex which lane `i` of `numbers` names in its last four bits.
+    fn pick(vertices: V, numbers: <Self::Corners as Lanes<8>>::Ids) -> Self::Corners;
+}
+
+/// Out of one register, which has up to eight vertices: by one shuffle.
+pub struct FromEight;
+
+/// Out of sixteen lanes: where those are two registers, by two shuffles and a choice.
+pub struct FromSixteen;
+
+impl<L: Eight> Picks<L> for FromEight {
+    type Corners = L;
+
     #[inline(always)]
-    const fn of_half(&self, half: usize) -> usize {
-        self.count.saturating_sub(half * 8)
+    fn pick(vertices: L, numbers: L::Ids) -> L {
+        vertices.pick(numbers)
+    }
+}
+
+impl<L: Sixteen> Picks<L> for FromSixteen {
+    type Corners = L::Half;
+
+    #[inline(always)]
+    fn pick(vertices: L, numbers: <L::Half as Lanes<8>>::Ids) -> L::Half {
+        vertices.pick_half(numbers)
     }
 }
 
@@ -202,42 +220,31 @@ impl Pooled {
 
     /// The same of the first eight triangles, or of the last eight.
     #[inline(always)]
-    pub fn prospects_of_half<L: Sixteen, const SIGNS: bool, const EARLY: bool>(
+    pub fn prospects_of_half<P: Picks<V>, V: Copy, const SIGNS: bool, const EARLY: bool>(
         &self,
-        Vertices { x, y, depth, size }: &Vertices<L>,
+        &Vertices { x, y, depth, size }: &Vertices<V>,
         triangles: &Sixteens<'_>,
         half: usize,
         tnear: f32,
         tfar: f32,
-    ) -> Prospects<8, L::Half> {
-        let (a, b, c) = triangles.corners_of_half::<L::Half>(half);
+    ) -> Prospects<8, P::Corners> {
+        let first = half * 8;
+        let corners = triangles.corners[first..].first_chunk().expect("there are two halves");
+        let a = P::Corners::ids_widen(corners);
+        let (b, c) = (P::Corners::ids_shift::<4>(a), P::Corners::ids_shift::<8>(a));
         let corners = [
-            [x.pick_half(a), y.pick_half(a), depth.pick_half(a)],
-            [x.pick_half(b), y.pick_half(b), depth.pick_half(b)],
-            [x.pick_half(c), y.pick_half(c), depth.pick_half(c)],
+            [P::pick(x, a), P::pick(y, a), P::pick(depth, a)],
+            [P::pick(x, b), P::pick(y, b), P::pick(depth, b)],
+            [P::pick(x, c), P::pick(y, c), P::pick(depth, c)],
         ];
-        let size = size.pick_half(a) + size.pick_half(b) + size.pick_half(c);
-        self.between::<8, L::Half, SIGNS, EARLY>(&corners, size, triangles.of_half(half), tnear, tfar)
-    }
-
-    /// The same where there are no more than eight vertices: each corner is one shuffle then, and not two and a choice.
-    #[inline(always)]
-    pub fn prospects_of_few<L: Eight, const SIGNS: bool, const EARLY: bool>(
-        &self,
-        Vertices { x, y, depth, size }: &Vertices<L>,
-        triangles: &Sixteens<'_>,
-        half: usize,
-        tnear: f32,
-        tfar: f32,
-    ) -> Prospects<8, L> {
-        let (a, b, c) = triangles.corners_of_half::<L>(half);
-        let corners = [
-            [x.pick(a), y.pick(a), depth.pick(a)],
-            [x.pick(b), y.pick(b), depth.pick(b)],
-            [x.pick(c), y.pick(c), depth.pick(c)],
-        ];
-        let size = size.pick(a) + size.pick(b) + size.pick(c);
-        self.between::<8, L, SIGNS, EARLY>(&corners, size, triangles.of_half(half), tnear, tfar)
+        let size = P::pick(size, a) + P::pick(size, b) + P::pick(size, c);
+        self.between::<8, P::Corners, SIGNS, EARLY>(
+            &corners,
+            size,
+            triangles.count.saturating_sub(first),
+            tnear,
+            tfar,
+        )
     }
 
     /// What the ray may find in so many triangles of such corners and sizes.

@@ -28,8 +28,10 @@ impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
             assert_eq!([early.first.store()[lane], early.last.store()[lane]], [all.2[lane], all.3[lane]]);
         }
         for half in 0..2 {
-            let Prospects { possible, certain, first, last } =
-                ray.prospects_of_half::<S::F16, SIGNS, false>(&vertices, triangles, half, tnear, tfar);
+            let Prospects { possible, certain, first, last } = ray
+                .prospects_of_half::<FromSixteen, S::F16, SIGNS, false>(
+                    &vertices, triangles, half, tnear, tfar,
+                );
             let of_all = |bits: u32| bits >> (8 * half) & 0xff;
             assert_eq!((possible.bits(), certain.bits()), (of_all(all.0), of_all(all.1)));
             for lane in (0..8).filter(|lane| possible.bits() >> lane & 1 == 1) {
@@ -41,7 +43,7 @@ impl<const SIGNS: bool> Task for Ask<'_, SIGNS> {
         let two = Sixteens { count: 2, ..*triangles };
         let few = ray.see_eight::<S::F8>(&two);
         let Prospects { possible, certain, first, last } =
-            ray.prospects_of_few::<S::F8, SIGNS, false>(&few, &two, 0, tnear, tfar);
+            ray.prospects_of_half::<FromEight, S::F8, SIGNS, false>(&few, &two, 0, tnear, tfar);
         assert_eq!((possible.bits(), certain.bits()), (all.0 & 3, all.1 & 3));
         for lane in (0..2).filter(|lane| all.0 >> lane & 1 == 1) {
             assert_eq!([first.store()[lane], last.store()[lane]], [all.2[lane], all.3[lane]]);
