@@ -5,6 +5,7 @@ use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::sixteen::Sixteen;
 use bytemuck::cast;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+use wide::f32x4;
 
 /// The instruction set that the target guarantees.
 #[derive(Clone, Copy, Debug)]
@@ -65,14 +66,23 @@ macro_rules! portable_lanes {
             fn store(self) -> [f32; $width] {
                 self.0.to_array()
             }
-            // `wide`'s own minimum spends two more instructions on NaN than our rule asks for.
+            // `wide`'s own minimum spends two more instructions on NaN than our rule asks for. Its quick one is one
+            // instruction of SSE, whose rule is ours; elsewhere its rule is another one.
             #[inline(always)]
             fn min(self, other: Self) -> Self {
-                Self::select(self.lt(other), self, other)
+                if cfg!(target_arch = "x86_64") {
+                    Self(self.0.fast_min(other.0))
+                } else {
+                    Self::select(self.lt(other), self, other)
+                }
             }
             #[inline(always)]
             fn max(self, other: Self) -> Self {
-                Self::select(other.lt(self), self, other)
+                if cfg!(target_arch = "x86_64") {
+                    Self(self.0.fast_max(other.0))
+                } else {
+                    Self::select(other.lt(self), self, other)
+                }
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -101,9 +111,11 @@ macro_rules! portable_lanes {
             }
             #[inline(always)]
             fn mask_from_bits(bits: u32) -> $mask {
-                $mask(wide::$float::new(std::array::from_fn(|lane| {
-                    f32::from_bits(if bits >> lane & 1 == 1 { u32::MAX } else { 0 })
-                })))
+                let lanes = wide::$int::new(std::array::from_fn(
+                    #[inline(always)]
+                    |lane| 1 << lane,
+                ));
+                $mask(cast((wide::$int::splat(bits as i32) & lanes).simd_eq(lanes)))
             }
             #[inline(always)]
             fn ids(id: i32) -> wide::$int {
@@ -152,12 +164,75 @@ portable_lanes!(4, F32x4, Mask4, f32x4, i32x4);
 portable_lanes!(8, F32x8, Mask8, f32x8, i32x8);
 portable_lanes!(16, F32x16, Mask16, f32x16, i32x16);
 
+/// Sixteen lanes as four registers, as most targets have them.
+#[inline(always)]
+fn registers(lanes: F32x16) -> [f32x4; 4] {
+    cast(lanes.0)
+}
+
+/// For each of four vectors its four registers folded into one: lanes `4 j` to `4 j + 3` into lane `j`.
+#[inline(always)]
+fn fold_registers(vectors: &[F32x16; 4], of: impl Fn(F32x4, F32x4) -> F32x4) -> F32x16 {
+    let mut folded = [f32x4::ZERO; 4];
+    for i in 0..4 {
+        let [a, b, c, d] = f32x4::transpose(registers(vectors[i])).map(F32x4);
+        folded[i] = of(of(a, b), of(c, d)).0;
+    }
+    F32x16(cast(folded))
+}
+
 impl Sixteen for F32x16 {
     type Half = F32x8;
 
     #[inline(always)]
+    fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
+        let mut columns = [[f32x4::ZERO; 4]; 4];
+        for part in 0..4 {
+            let rows = [0, 1, 2, 3].map(
+                #[inline(always)]
+                |row| f32x4::new(*fours[4 * part + row]),
+            );
+            let turned = f32x4::transpose(rows);
+            for i in 0..4 {
+                columns[i][part] = turned[i];
+            }
+        }
+        columns.map(
+            #[inline(always)]
+            |column| Self(cast(column)),
+        )
+    }
+
+    #[inline(always)]
+    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16] {
+        let columns = columns.map(registers);
+        let mut fours = [[f32x4::ZERO; 4]; 4];
+        for part in 0..4 {
+            fours[part] =
+                f32x4::transpose([columns[0][part], columns[1][part], columns[2][part], columns[3][part]]);
+        }
+        cast(fours)
+    }
+
+    #[inline(always)]
     fn ids_load(ids: &[i32; 16]) -> wide::i32x16 {
         wide::i32x16::new(*ids)
+    }
+
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: wide::i32x16) -> wide::i32x16 {
+        let bits: wide::u32x16 = cast(ids);
+        cast(bits >> BITS)
+    }
+
+    #[inline(always)]
+    fn least_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_registers(vectors, Lanes::min)
+    }
+
+    #[inline(always)]
+    fn greatest_of_fours(vectors: &[Self; 4]) -> Self {
+        fold_registers(vectors, Lanes::max)
     }
 }
 
@@ -165,5 +240,11 @@ impl Eight for F32x8 {
     #[inline(always)]
     fn ids_load(ids: &[i32; 8]) -> wide::i32x8 {
         wide::i32x8::new(*ids)
+    }
+
+    #[inline(always)]
+    fn ids_shift<const BITS: i32>(ids: wide::i32x8) -> wide::i32x8 {
+        let bits: wide::u32x8 = cast(ids);
+        cast(bits >> BITS)
     }
 }
