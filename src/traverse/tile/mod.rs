@@ -66,7 +66,7 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
 ) -> [[u32; PACKETS]; K] {
     let (mut left, mut work) = (*active, 0);
     for _ in 0..BEAMS {
-        let done = if S::NATIVE == 16 {
+        let done = if const { S::NATIVE == 16 } {
             nearest::<S::F16, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, work, hits, probe)
         } else {
             nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, work, hits, probe)
@@ -89,7 +89,7 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
 ) -> [u32; PACKETS] {
     let (mut left, mut work) = ([*active], 0);
     for _ in 0..BEAMS {
-        let done = if S::NATIVE == 16 {
+        let done = if const { S::NATIVE == 16 } {
             shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, work, found, probe)
         } else {
             shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, work, found, probe)
