@@ -1,7 +1,7 @@
 //! What eight lanes can do beside the rest: move values across lanes.
 //!
 //! One ray meets eight planes, exits or triangles at once, so that lanes hold what belongs together and
-//! have to be brought next to one another. Every method has a body in plain code, which the portable
+//! have to be brought next to one another. Most methods have a body in plain code, which the portable
 //! implementation uses as it is.
 
 use super::lanes::Lanes;
@@ -111,14 +111,7 @@ pub trait Eight: Lanes<8> {
     }
 
     /// Every lane shifted right by `BITS`; zeros come in.
-    #[inline(always)]
-    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids {
-        let mut ids = Self::ids_store(ids);
-        for id in &mut ids {
-            *id = ((*id as u32) >> BITS) as i32;
-        }
-        Self::ids_load(&ids)
-    }
+    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids;
 
     /// The bits that are set in both.
     #[inline(always)]

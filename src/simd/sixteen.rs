@@ -41,29 +41,10 @@ pub trait Sixteen: Lanes<16> {
     }
 
     /// Rows and columns exchanged: lane `j` of vector `i` is number `i` of `fours[j]`.
-    #[inline(always)]
-    fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
-        let mut columns = [[0.0; 16]; 4];
-        for lane in 0..16 {
-            for i in 0..4 {
-                columns[i][lane] = fours[lane][i];
-            }
-        }
-        [Self::load(&columns[0]), Self::load(&columns[1]), Self::load(&columns[2]), Self::load(&columns[3])]
-    }
+    fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4];
 
     /// The same back: number `i` of four `j` is lane `j` of vector `i`.
-    #[inline(always)]
-    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16] {
-        let columns = [columns[0].store(), columns[1].store(), columns[2].store(), columns[3].store()];
-        let mut fours = [[0.0; 4]; 16];
-        for lane in 0..16 {
-            for i in 0..4 {
-                fours[lane][i] = columns[i][lane];
-            }
-        }
-        fours
-    }
+    fn fours(columns: &[Self; 4]) -> [[f32; 4]; 16];
 
     /// Lane `i` is `ids[i]`.
     fn ids_load(ids: &[i32; 16]) -> Self::Ids;
@@ -99,14 +80,7 @@ pub trait Sixteen: Lanes<16> {
     }
 
     /// Every lane shifted right by `BITS`; zeros come in.
-    #[inline(always)]
-    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids {
-        let mut ids = Self::ids_store(ids);
-        for id in &mut ids {
-            *id = ((*id as u32) >> BITS) as i32;
-        }
-        Self::ids_load(&ids)
-    }
+    fn ids_shift<const BITS: i32>(ids: Self::Ids) -> Self::Ids;
 
     /// Lane `i` becomes lane `ids[i] & 15`.
     #[inline(always)]

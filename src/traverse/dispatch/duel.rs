@@ -9,7 +9,7 @@
 //! goes, the ways matter more: pairs are weighted by how long they took, the quicker of both, as something else may have run meanwhile.
 //!
 //! The way that is thought to be slower has not been gone for a hundred lots and more by then, so that its code is in no near cache: that took
-//! camera rays inside a power plant 7 % more than it should have, and two processes of three stayed with the slower way for it. So the lot
+//! camera rays inside a power plant 7 % more than it should have, and about half of the processes stayed with the slower way for it. So the lot
 //! before a pair goes that way alone.
 //!
 //! That is for two ways that are to one another much as they are everywhere, and neither of which is many times slower: going both costs what
@@ -25,10 +25,8 @@ pub struct Duel {
     weight: f32,
     /// Pairs so far.
     pairs: u32,
-    /// Lots until the next one.
+    /// Lots until the next one, of which the last goes the slower way.
     wait: f32,
-    /// Whether the lot before it has gone the slower way.
-    is_warm: bool,
 }
 
 /// What the next lot does.
@@ -69,11 +67,8 @@ impl Duel {
     pub fn next(&mut self) -> Turn {
         if self.wait > 0.0 {
             self.wait -= 1.0;
-            return Turn::One(self.quicker());
-        }
-        if !self.is_warm {
-            self.is_warm = true;
-            return Turn::One(1 - self.quicker());
+            let is_last = self.wait <= 0.0;
+            return Turn::One(if is_last { 1 - self.quicker() } else { self.quicker() });
         }
         let first = self.pairs as usize % 2;
         Turn::Both([first, 1 - first])
@@ -81,7 +76,6 @@ impl Duel {
 
     /// Says how long a lot took either way.
     pub fn record(&mut self, spent: [Duration; 2]) {
-        self.is_warm = false;
         // Clocks may stand still over a short lot.
         let [first, second] = spent.map(|spent| (spent.as_nanos() as f32).max(1.0));
         let weight = first.min(second);
