@@ -132,6 +132,10 @@ macro_rules! avx2_lanes {
                 $mask(avx!($to_float($ieq($iand(bits, weights), weights))))
             }
             #[inline(always)]
+            fn mask_of_first(count: usize) -> $mask {
+                $mask(avx!($to_float($igt($iset(1 << (count & 31)), $isetr()))))
+            }
+            #[inline(always)]
             fn ids(id: i32) -> $int {
                 avx!($iset(id))
             }

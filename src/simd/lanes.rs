@@ -77,6 +77,12 @@ pub trait Lanes<const W: usize>:
     /// The mask whose lane `i` is bit `i` of `bits`.
     fn mask_from_bits(bits: u32) -> Self::Mask;
 
+    /// The first `count` lanes, or all if there are not as many. `count` is at most 30.
+    #[inline(always)]
+    fn mask_of_first(count: usize) -> Self::Mask {
+        Self::mask_from_bits((1 << count.min(W)) - 1)
+    }
+
     /// The same id in every lane.
     fn ids(id: i32) -> Self::Ids;
     /// `a < b`, signed.

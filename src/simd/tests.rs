@@ -57,6 +57,12 @@ fn check<const W: usize, L: Lanes<W>>() {
         let pattern = (shift as u32).wrapping_mul(2654435761) & full;
         let mask = L::mask_from_bits(pattern);
         assert_eq!(mask.bits() & full, pattern);
+        let first = shift % 31;
+        assert_eq!(
+            L::mask_of_first(first).bits() & full,
+            (1 << first) - 1 & full,
+            "the first {first} of {W}"
+        );
         let picked = L::select(mask, x, y).store();
         for i in 0..W {
             let want = if pattern >> i & 1 == 1 { a[i] } else { b[i] };

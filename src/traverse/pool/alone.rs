@@ -24,6 +24,7 @@ use crate::kdtree::{Chunk, Pools, Tree, Way};
 use crate::simd::{Lanes, Mask, Simd};
 use crate::traverse::records::Resident;
 use crate::traverse::stream::step::{IN_PAIRS, Waiting};
+use std::hint::black_box;
 
 /// Traces a ray, and gives an answer for ray 0.
 #[inline(always)]
@@ -38,14 +39,23 @@ pub fn trace<S: Simd, M: Mode, A: OfFlights>(
     let prepared = if resident.tree.scale().is_none() { Prepared::new(ray, pools.corners()) } else { None };
     let Some(Prepared { slabs, pooled, tfar }) = prepared else { return answers.odd::<M>(resident, 0, ray) };
     list.clear();
-    let mut walk =
-        Walk::<S, M> { resident, ways: Ways::new(pools), ray, slabs, pooled, tfar, list, waiting, top: 0 };
+    let mut walk = Walk::<S, M> {
+        resident,
+        ways: Ways::new(pools),
+        ray,
+        slabs,
+        pooled: &pooled,
+        tfar,
+        list,
+        waiting,
+        top: 0,
+    };
     if walk.all::<A>() {
         answers.hits(0);
     } else if walk.list.is_empty() {
         answers.missed(0);
     } else {
-        let test = walk.pooled.test::<M>(ray);
+        let test = pooled.test::<M>(ray);
         let nearest = walk.list.nearest::<M>(&test, resident.records, ray, walk.tfar);
         answers.decide::<M>(resident, 0, nearest);
     }
@@ -57,7 +67,8 @@ struct Walk<'a, 'b, S: Simd, M: Mode> {
     ways: Ways<'a>,
     ray: &'a Ray,
     slabs: Spread<S::F8>,
-    pooled: Pooled,
+    /// (In a place of its own: see [`look_at`](Self::look_at).)
+    pooled: &'a Pooled,
     /// What a hit must not lie beyond: where the nearest of those that are certain lies at the latest, or the ray's end.
     tfar: f32,
     /// What it may hit.
@@ -108,8 +119,11 @@ impl<S: Simd, M: Mode> Walk<'_, '_, S, M> {
     /// Looks at a chunk. Says whether anything is hit for certain, where that is enough.
     #[inline(always)]
     fn look_at<A: OfFlights>(&mut self, chunk: Chunk<'_>) -> bool {
+        // What is the same for all chunks would be spread over registers before the first node. Where those are few, it is only spilled
+        // there, and few rays that any hit will do for ever come to a chunk.
+        let pooled = if A::ANY && S::NATIVE == 8 { black_box(self.pooled) } else { self.pooled };
         let mut looking = Looking::<true>::new(self.list, self.tfar, A::ANY);
-        look::<S::F16, M, true>(&self.pooled, chunk, self.ray.tnear, &mut looking);
+        look::<S::F16, M, true>(pooled, chunk, self.ray.tnear, &mut looking);
         let Looking { possible, certain, tfar, .. } = looking;
         if A::ANY && certain {
             return true;

@@ -263,7 +263,7 @@ impl Pooled {
             tnear: L::splat(tnear),
             tfar: L::splat(tfar),
         };
-        let present = L::mask_from_bits((1 << count.min(W)) - 1);
+        let present = L::mask_of_first(count);
         if EARLY && SIGNS && !(present & one_sign(&edges(corners))).any() {
             let (none, zero) = (L::mask_from_bits(0), L::splat(0.0));
             return Prospects { possible: none, certain: none, first: zero, last: zero };
