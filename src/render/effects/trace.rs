@@ -6,7 +6,9 @@ use super::path::Way;
 use crate::geometry::{Hit, Ray};
 use crate::scene::Surface;
 use crate::scene::effects::Effect;
-use crate::traverse::{Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch, give_lanes};
+use crate::traverse::{
+    Accel, Dispatch, HitPacket, Kernel, Place, RayPacket, ScatteredDispatch, SliceDispatch, give_lanes,
+};
 
 /// Rays that go to a kernel at once: as many as a wide beam holds.
 const LOT: usize = Kernel::WideTile.width();
@@ -14,10 +16,14 @@ const LOT: usize = Kernel::WideTile.width();
 /// Traces a worker's rays, and learns which kernel is quickest for which kind of them.
 #[derive(Debug, Default)]
 pub struct Tracer {
-    /// What was learnt about rays that may have much in common.
-    ways: [Dispatch; Way::ALL.len()],
-    /// The same of rays to lights.
-    lights: [Dispatch; 2],
+    /// What was learnt about camera rays.
+    camera: Dispatch,
+    /// The same of rays to lights that are points or suns.
+    lights: Dispatch,
+    /// The same of what has much in common or nothing, as the scene has it: a flat mirror's rays do, those of a crumpled one do not.
+    ways: [SliceDispatch; Way::ALL.len()],
+    /// And of rays to lights that have an extent.
+    wide_lights: SliceDispatch,
     /// What was learnt about rays that go everywhere: from surfaces, and to all that surrounds the scene.
     scattered: ScatteredDispatch,
     /// The same of rays that look no farther than for what dims a surface.
@@ -59,15 +65,12 @@ impl Packets {
 impl Tracer {
     /// With what was learnt in earlier frames about camera rays and shadow rays.
     pub fn new(learnt: Dispatch) -> Self {
-        let mut tracer = Self::default();
-        tracer.ways[Way::Camera as usize] = learnt;
-        tracer.lights[0] = learnt;
-        tracer
+        Self { camera: learnt, lights: learnt, ..Self::default() }
     }
 
     /// What was learnt about camera rays.
     pub fn learnt(&self) -> Dispatch {
-        self.ways[Way::Camera as usize]
+        self.camera
     }
 
     /// The closest hits of rays of one kind, by the kernel named or, for beams, by whichever is quickest.
@@ -76,13 +79,12 @@ impl Tracer {
             (Kernel::Tile | Kernel::WideTile, Way::Diffuse) => {
                 self.scattered.intersect(accel, rays, hits);
             }
-            (Kernel::Tile | Kernel::WideTile, _) => {
-                let dispatch = &mut self.ways[way as usize];
+            (Kernel::Tile | Kernel::WideTile, Way::Camera) => {
                 for (rays, hits) in rays.chunks(LOT).zip(hits.chunks_mut(LOT)) {
                     let packets = &mut self.packets;
                     let count = packets.fill(accel, rays);
                     let found = &mut packets.hits[..count];
-                    dispatch.intersect(
+                    self.camera.intersect(
                         accel,
                         &[Place::NONE],
                         &packets.rays[..count],
@@ -91,6 +93,9 @@ impl Tracer {
                     );
                     accel.unpack(found, hits);
                 }
+            }
+            (Kernel::Tile | Kernel::WideTile, _) => {
+                self.ways[way as usize].intersect(accel, rays, hits);
             }
             (kernel, _) => accel.intersect_many(kernel, rays, hits),
         }
@@ -114,13 +119,14 @@ impl Tracer {
             self.scattered.occluded(accel, rays, &mut self.found);
         } else if effect == Effect::AmbientOcclusion {
             self.near.occluded(accel, rays, &mut self.found);
+        } else if effect == Effect::SoftShadows {
+            self.wide_lights.occluded(accel, rays, &mut self.found);
         } else {
-            let dispatch = &mut self.lights[usize::from(effect == Effect::SoftShadows)];
             for (rays, found) in rays.chunks(LOT).zip(self.found.chunks_mut(LOT)) {
                 let packets = &mut self.packets;
                 let count = packets.fill(accel, rays);
                 let lanes = &mut packets.occluded[..count];
-                dispatch.occluded(
+                self.lights.occluded(
                     accel,
                     &[Place::NONE],
                     &packets.rays[..count],
