@@ -60,7 +60,7 @@ fn check<const W: usize, L: Lanes<W>>() {
         let first = shift % 31;
         assert_eq!(
             L::mask_of_first(first).bits() & full,
-            (1 << first) - 1 & full,
+            ((1 << first) - 1) & full,
             "the first {first} of {W}"
         );
         let picked = L::select(mask, x, y).store();
