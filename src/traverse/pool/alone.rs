@@ -120,7 +120,7 @@ impl<S: Simd, M: Mode> Walk<'_, '_, S, M> {
     #[inline(always)]
     fn look_at<A: OfFlights>(&mut self, chunk: Chunk<'_>) -> bool {
         // What is the same for all chunks would be spread over registers before the first node. Where those are few, it is only spilled
-        // there, and few rays that any hit will do for ever come to a chunk.
+        // there, and rays that any hit will do for come to few chunks.
         let pooled = if A::ANY && S::NATIVE == 8 { black_box(self.pooled) } else { self.pooled };
         let mut looking = Looking::<true>::new(self.list, self.tfar, A::ANY);
         look::<S::F16, M, true>(pooled, chunk, self.ray.tnear, &mut looking);
