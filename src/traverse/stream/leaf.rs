@@ -52,7 +52,7 @@ impl Leaf {
         let words = words[self.next as usize..].first_chunk().expect("words behind the last record");
         self.next += 8;
         let ids = L::ids_load(bytemuck::cast_ref::<[u32; 8], [i32; 8]>(words));
-        let present = L::mask_from_bits((1 << self.left.min(8)) - 1);
+        let present = L::mask_of_first(self.left.min(8) as usize);
         self.primitives = L::ids_store(L::ids_select(present, ids, L::ids(words[0] as i32)));
         for primitive in self.primitives {
             prefetch_both(records.as_ptr().wrapping_add(primitive as usize));
