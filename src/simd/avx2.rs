@@ -4,9 +4,11 @@
 //! The types here call AVX and AVX2 intrinsics from safe methods. They are private to `simd`,
 //! and only [`Avx2`] and `Avx512` name them; those two are instantiated in one place each, the
 //! `#[target_feature]` entries of `isa.rs`, which a [`super::Chosen`] reaches only after the
-//! machine has been asked. So wherever a method of these types runs, the machine has AVX2.
+//! machine has been asked, and what runs there already by [`Simd::apart`]. So wherever a method of these types runs, the
+//! machine has AVX2.
 
 use super::eight::{Eight, LANES_OF};
+use super::isa::{Task, run_avx2};
 use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::pair::Pair;
 use std::arch::x86_64::*;
@@ -21,6 +23,12 @@ impl Simd for Avx2 {
     type F4 = F32x4;
     type F8 = F32x8;
     type F16 = Pair<F32x8>;
+
+    #[inline(always)]
+    fn apart<T: Task>(task: T) -> T::Output {
+        // SAFETY: this runs only on machines that have AVX2 (see the head of the file).
+        unsafe { run_avx2(task) }
+    }
 }
 
 /// Calls an intrinsic. The one `unsafe` of this file.

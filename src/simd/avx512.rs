@@ -5,6 +5,7 @@
 //! the `#[target_feature]` entry that a [`super::Chosen`] reaches after the machine was asked.
 
 use super::avx2;
+use super::isa::{Task, run_avx512};
 use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::sixteen::Sixteen;
 use std::arch::x86_64::*;
@@ -19,6 +20,12 @@ impl Simd for Avx512 {
     type F4 = avx2::F32x4;
     type F8 = avx2::F32x8;
     type F16 = F32x16;
+
+    #[inline(always)]
+    fn apart<T: Task>(task: T) -> T::Output {
+        // SAFETY: this runs only on machines that have AVX-512 (see the head of the file).
+        unsafe { run_avx512(task) }
+    }
 }
 
 /// Calls an intrinsic. The one `unsafe` of this file.

@@ -3,7 +3,6 @@
 use super::lanes::Simd;
 #[cfg(fuzzing)]
 use super::only;
-#[cfg(not(fuzzing))]
 use super::portable::Portable;
 use crate::error::{Error, Result};
 use std::fmt;
@@ -166,21 +165,26 @@ impl fmt::Debug for Chosen {
     }
 }
 
-/// Out of line as the others are: callers would all compile it anew.
-#[cfg(not(fuzzing))]
+// Never inlined: callers would all compile it anew, and what a kernel does apart is apart so.
+
+/// Runs a task compiled for [`Isa::Portable`] alone, which every machine has.
 #[inline(never)]
-fn run_portable<T: Task>(task: T) -> T::Output {
+pub fn run_portable<T: Task>(task: T) -> T::Output {
     task.run::<Portable>()
 }
 
-#[cfg(all(target_arch = "x86_64", not(fuzzing)))]
+#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn run_avx2<T: Task>(task: T) -> T::Output {
+#[inline(never)]
+#[cfg_attr(fuzzing, allow(dead_code))]
+pub(super) fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run::<super::avx2::Avx2>()
 }
 
-#[cfg(all(target_arch = "x86_64", not(fuzzing)))]
+#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn run_avx512<T: Task>(task: T) -> T::Output {
+#[inline(never)]
+#[cfg_attr(fuzzing, allow(dead_code))]
+pub(super) fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<super::avx512::Avx512>()
 }

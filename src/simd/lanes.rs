@@ -1,6 +1,7 @@
 //! What a vector of `W` floats can do.
 
 use super::eight::Eight;
+use super::isa::Task;
 use super::sixteen::Sixteen;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -120,7 +121,7 @@ fn fold<const W: usize>(mut values: [f32; W], of: impl Fn(f32, f32) -> f32) -> f
 }
 
 /// The vector types of an instruction set.
-pub trait Simd {
+pub trait Simd: Sized {
     /// Lanes that a register holds, 8 or 16: wider vectors run out of registers in long kernels.
     const NATIVE: usize;
     /// Four floats.
@@ -129,4 +130,10 @@ pub trait Simd {
     type F8: Eight;
     /// Sixteen floats.
     type F16: Sixteen;
+
+    /// Does a part of a kernel's work out of line, compiled for this instruction set as the kernel is: what is long, and is
+    /// come to from several places, or in several kernels, is compiled once so, and not once for each.
+    ///
+    /// What a task borrows lies in memory while the kernel runs: it should borrow nothing that is better kept in registers.
+    fn apart<T: Task>(task: T) -> T::Output;
 }

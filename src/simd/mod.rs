@@ -36,7 +36,7 @@ mod pair;
 pub use branch::stay_a_branch;
 pub use dense::Dense;
 pub use eight::Eight;
-pub use isa::{Chosen, Isa, Task};
+pub use isa::{Chosen, Isa, Task, run_portable};
 pub use lanes::{Lanes, Mask, Simd, TAG, TAGS};
 pub use prefetch::{prefetch, prefetch_both};
 pub use sixteen::Sixteen;

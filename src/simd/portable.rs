@@ -1,6 +1,7 @@
 //! The portable implementation, through `wide`: SSE2 on x86-64, NEON on AArch64, and so on.
 
 use super::eight::Eight;
+use super::isa::{Task, run_portable};
 use super::lanes::{Lanes, Mask, Simd, TAGS};
 use super::sixteen::Sixteen;
 use bytemuck::cast;
@@ -16,6 +17,11 @@ impl Simd for Portable {
     type F4 = F32x4;
     type F8 = F32x8;
     type F16 = F32x16;
+
+    #[inline(always)]
+    fn apart<T: Task>(task: T) -> T::Output {
+        run_portable(task)
+    }
 }
 
 macro_rules! portable_lanes {

@@ -13,7 +13,7 @@ use crate::geometry::triangle::{Exact, Fast, Watertight};
 use crate::geometry::{Aabb, Accuracy, Hit, Ray};
 use crate::kdtree::{BuildParams, BuildProgress, KdTree, Pools, TreeStats};
 use crate::mesh::Mesh;
-use crate::simd::{Chosen, Isa};
+use crate::simd::{Chosen, Isa, run_portable};
 use rayon::prelude::*;
 use std::slice::{from_mut, from_ref};
 use std::sync::Arc;
@@ -373,14 +373,15 @@ impl Accel {
     }
 
     /// Adds up what [`intersect_tile`](Self::intersect_tile) does with these rays, or, with `any_hit`,
-    /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode. Panics if the scene is not all
-    /// in memory.
+    /// what [`occluded_tile`](Self::occluded_tile) does, in watertight mode. Counted on the portable instruction set,
+    /// whichever is chosen: culling rounds otherwise on others, by which next to nothing changes, and they would all be compiled
+    /// for counting alone. Panics if the scene is not all in memory.
     pub fn count_tile(&self, rays: &[RayPacket<16>], active: &[u32], any_hit: bool, counts: &mut TileCounts) {
         let [lanes] = tile_lanes::<1>(rays, active);
         let query = CountTile { rays, active: &lanes, any_hit, counts: &mut *counts };
         let tree = self.tree();
         let triangles = Resident { tree, records: tree.triangles() };
-        let left = self.chosen.run(InMode::<_, Watertight, _>::new(query, &triangles));
+        let left = run_portable(InMode::<_, Watertight, _>::new(query, &triangles));
         counts.beams += u64::from(left != lanes);
     }
 

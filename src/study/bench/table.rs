@@ -27,7 +27,10 @@ impl fmt::Display for Report {
         writeln!(f, "\nEvery mode that ran\n")?;
         write!(f, "{}", grid(&self.modes()))?;
         if !self.beams.is_empty() {
-            writeln!(f, "\nWhat a beam of up to 256 rays does in raypack's tile kernel, on average\n")?;
+            writeln!(
+                f,
+                "\nWhat a beam of up to 256 rays does in raypack's tile kernel, on average (counted on portable)\n"
+            )?;
             write!(f, "{}", grid(&self.beam_lines()))?;
         }
         if !self.agreements.is_empty() {

@@ -9,10 +9,11 @@ use super::list::Nearest;
 use crate::geometry::triangle::{self, Candidate, Mode, Own, Test, Triangle};
 use crate::geometry::{Hit, Ray};
 use crate::kdtree::{MOST, Tree};
-use crate::simd::{Lanes, Simd, Sixteen, prefetch_both};
+use crate::simd::{Lanes, Simd, Sixteen, Task, prefetch_both};
 use crate::traverse::records::Resident;
 use crate::traverse::source::Source;
 use crate::traverse::stream::{Answers, Any, Closest, OneByOne};
+use std::marker::PhantomData;
 
 /// Triangles that wait, and the ray of each.
 pub struct Pairs {
@@ -187,8 +188,8 @@ pub trait Told: Answers {
         rays: Source<'_>,
         pairs: &mut Pairs,
     ) {
-        while pairs.count > ROOM {
-            self.answer::<S, M>(tree, rays, pairs);
+        if pairs.count > ROOM {
+            S::apart(Answering::<M, Self>::until(ROOM, self, tree, rays, pairs));
         }
     }
 
@@ -200,11 +201,49 @@ pub trait Told: Answers {
         rays: Source<'_>,
         pairs: &mut Pairs,
     ) {
-        while pairs.count > 0 {
+        if pairs.count > 0 {
+            S::apart(Answering::<M, Self>::until(0, self, tree, rays, pairs));
+        }
+    }
+}
+
+/// Answers until no more than `most` wait.
+struct Answering<'a, M: Mode, A: ?Sized> {
+    most: usize,
+    answers: &'a mut A,
+    tree: Resident<'a, M::Record>,
+    rays: Source<'a>,
+    pairs: &'a mut Pairs,
+    mode: PhantomData<M>,
+}
+
+impl<'a, M: Mode, A: ?Sized> Answering<'a, M, A> {
+    #[inline(always)]
+    fn until(
+        most: usize,
+        answers: &'a mut A,
+        tree: &Resident<'a, M::Record>,
+        rays: Source<'a>,
+        pairs: &'a mut Pairs,
+    ) -> Self {
+        // The tree by value: a kernel keeps it in registers.
+        let tree = Resident { tree: tree.tree, records: tree.records };
+        Self { most, answers, tree, rays, pairs, mode: PhantomData }
+    }
+}
+
+impl<M: Mode, A: Told + ?Sized> Task for Answering<'_, M, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { answers, tree, rays, pairs, most, .. } = self;
+        while pairs.count > most {
+            // Lanes that are too many ask what the first one does.
             for place in pairs.count..16 {
                 (pairs.rays[place], pairs.primitives[place]) = (pairs.rays[0], pairs.primitives[0]);
             }
-            self.answer::<S, M>(tree, rays, pairs);
+            answers.answer::<S, M>(&tree, rays, pairs);
         }
     }
 }

@@ -67,9 +67,9 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     let (mut left, mut work) = (*active, 0);
     for _ in 0..BEAMS {
         let done = if const { S::NATIVE == 16 } {
-            nearest::<S::F16, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, work, hits, probe)
+            nearest::<S, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, work, hits, probe)
         } else {
-            nearest::<S::F16, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, work, hits, probe)
+            nearest::<S, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, work, hits, probe)
         };
         let Some(so_far) = done.take_from(&mut left) else { break };
         work = so_far;
@@ -90,9 +90,9 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     let (mut left, mut work) = ([*active], 0);
     for _ in 0..BEAMS {
         let done = if const { S::NATIVE == 16 } {
-            shadows::<S::F16, S::F16, T, M, P, 16>(tree, rays, &left, work, found, probe)
+            shadows::<S, S::F16, T, M, P, 16>(tree, rays, &left, work, found, probe)
         } else {
-            shadows::<S::F16, S::F8, T, M, P, 8>(tree, rays, &left, work, found, probe)
+            shadows::<S, S::F8, T, M, P, 8>(tree, rays, &left, work, found, probe)
         };
         let Some(so_far) = done.take_from(&mut left) else { break };
         work = so_far;
@@ -130,7 +130,7 @@ impl<const K: usize> Done<K> {
 
 /// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which lanes it was.
 #[inline(always)]
-fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
+fn nearest<S, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; K],
@@ -139,7 +139,7 @@ fn nearest<L, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
     probe: &mut P,
 ) -> Done<K>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -150,17 +150,17 @@ where
     }
     let Some((Form::From, frame)) = form::guess(rays, active) else { return Done::NOTHING };
     let (mut belong, mut slopes) = (*active, Slopes::new());
-    let Some(extents) = form::from_apex::<L, K>(&frame, rays, &mut belong, &mut slopes) else {
+    let Some(extents) = form::from_apex::<S::F16, K>(&frame, rays, &mut belong, &mut slopes) else {
         return Done::NOTHING;
     };
     let extent = Extent::of_lanes(&extents);
-    let (beam, interval) = Beam::<L, false>::new(frame, &extent, Spread::default(), tree.bounds());
+    let (beam, interval) = Beam::<S::F16, false>::new(frame, &extent, Spread::default(), tree.bounds());
     if !interval.live().any() {
         // Nothing but sky. It is a large part of many a picture, and what comes now makes ready for more than that.
         miss(&belong, hits);
         return Done { lanes: belong, work: Some(work) };
     }
-    let mut bundle = Nearest::<L, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
+    let mut bundle = Nearest::<S, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
     bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
     let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
@@ -185,7 +185,7 @@ fn miss<const K: usize>(lanes: &[[u32; PACKETS]; K], hits: &mut [HitPacket<16>])
 
 /// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
 #[inline(always)]
-fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
+fn shadows<S: Simd, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; 1],
@@ -199,14 +199,14 @@ fn shadows<L: Sixteen, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: u
     let Some((form, frame)) = form::guess(rays, active) else { return Done::NOTHING };
     let mut seen = Seen::new();
     let [mut belong] = *active;
-    let Some((extent, spread)) = form::of_form::<L>(form, &frame, rays, &mut belong, &mut seen) else {
+    let Some((extent, spread)) = form::of_form::<S::F16>(form, &frame, rays, &mut belong, &mut seen) else {
         return Done::NOTHING;
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
     let (open, work) = if form == Form::Along {
-        trace.shadows::<R, M, P, N, true>(&mut seen, work, probe)
+        trace.shadows::<S, R, M, P, N, true>(&mut seen, work, probe)
     } else {
-        trace.shadows::<R, M, P, N, false>(&mut seen, work, probe)
+        trace.shadows::<S, R, M, P, N, false>(&mut seen, work, probe)
     };
     for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
         *found |= belong & !open;
@@ -227,13 +227,14 @@ struct Trace<'a, L, T> {
 impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
     /// The lanes that find nothing, and the work so far if the beam paid.
     #[inline(always)]
-    fn shadows<R, M, P, const N: usize, const PARALLEL: bool>(
+    fn shadows<S, R, M, P, const N: usize, const PARALLEL: bool>(
         &self,
         seen: &mut Seen,
         work: u32,
         probe: &mut P,
     ) -> ([u32; PACKETS], Option<u32>)
     where
+        S: Simd<F16 = L>,
         R: Lanes<N>,
         M: Mode,
         T: Records<M>,
@@ -242,7 +243,7 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
         let Self { tree, rays, active, frame, ref extent, spread } = *self;
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
         let mut bundle =
-            Shadows::<L, R, T, M, N, PARALLEL>::new(tree, rays, active, frame.axes[2], seen, &interval);
+            Shadows::<S, R, T, M, N, PARALLEL>::new(tree, rays, active, frame.axes[2], seen, &interval);
         let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
         let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
         (bundle.open, work)

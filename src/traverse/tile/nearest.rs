@@ -6,23 +6,24 @@ use super::form::Slopes;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test};
-use crate::simd::{Lanes, Mask, Sixteen};
+use crate::simd::{Lanes, Mask, Simd, Task};
 use crate::traverse::closest::{Closest, Normals};
 use crate::traverse::lanes::{HitPacket, RayPacket};
 use crate::traverse::packet::descend;
 use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk};
+use std::marker::PhantomData;
 
 /// What the tests of `N` rays keep for a beam.
 type Kept<M, R, const N: usize> = <<M as Mode>::Test<N, R> as Test<N, R>>::Kept;
 
 /// Up to `K` squares of sixteen packets.
 ///
-/// A square's packets stand in the lanes of `L`. Rays stand in the lanes of `R`, as many as a
+/// A square's packets stand in sixteen lanes. Rays stand in the lanes of `R`, as many as a
 /// register holds, in `P` parts.
-pub struct Nearest<'a, L, R, T, M, const N: usize, const P: usize, const K: usize>
+pub struct Nearest<'a, S, R, T, M, const N: usize, const P: usize, const K: usize>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -31,17 +32,17 @@ where
     rays: &'a [RayPacket<16>],
     /// Which lanes of each packet count.
     active: &'a [[u32; PACKETS]; K],
-    beam: &'a Beam<L, false>,
+    beam: &'a Beam<S::F16, false>,
     kept: [[[Kept<M, R, N>; P]; PACKETS]; K],
     closest: [[[Closest<N, R>; P]; PACKETS]; K],
     /// The depth beyond which no ray of a packet looks for anything any more. In a register: a lane that is stored
     /// by itself and loaded with the others at once waits for the memory.
-    reach: [L; K],
+    reach: [S::F16; K],
 }
 
-impl<'a, L, R, T, M, const N: usize, const P: usize, const K: usize> Nearest<'a, L, R, T, M, N, P, K>
+impl<'a, S, R, T, M, const N: usize, const P: usize, const K: usize> Nearest<'a, S, R, T, M, N, P, K>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -52,7 +53,7 @@ where
         tree: &'a T,
         rays: &'a [RayPacket<16>],
         active: &'a [[u32; PACKETS]; K],
-        beam: &'a Beam<L, false>,
+        beam: &'a Beam<S::F16, false>,
     ) -> Self {
         Self {
             tree,
@@ -61,7 +62,7 @@ where
             beam,
             kept: [[[Default::default(); P]; PACKETS]; K],
             closest: [[[Closest::new(R::splat(f32::NEG_INFINITY)); P]; PACKETS]; K],
-            reach: [L::splat(f32::INFINITY); K],
+            reach: [S::F16::splat(f32::INFINITY); K],
         }
     }
 
@@ -110,9 +111,8 @@ where
     /// A part's test.
     #[inline(always)]
     fn part_test(&self, square: usize, packet: usize, part: usize) -> M::Test<N, R> {
-        let direction = load_part3::<N, R>(&self.rays[square * PACKETS + packet].direction, part);
-        let kept = &self.kept[square][packet][part];
-        M::Test::<N, R>::revive(kept, &self.beam.frame.apex, &direction, self.beam.frame.axes[2])
+        let rays = &self.rays[square * PACKETS + packet];
+        part_test::<R, M, N>(&self.beam.frame, rays, part, &self.kept[square][packet][part])
     }
 
     /// Writes the hits of a packet's lanes that count. `normals` knows what it was asked for the packet before.
@@ -139,15 +139,16 @@ where
             let depth = R::select(counts, depths, R::splat(f32::NEG_INFINITY)).greatest();
             reach = if depth > reach { depth } else { reach };
         }
-        let reach = L::splat(reach + reach.abs() * ROUNDINGS);
-        self.reach[square] = L::select(L::mask_from_bits(1 << packet), reach, self.reach[square]);
+        let reach = S::F16::splat(reach + reach.abs() * ROUNDINGS);
+        let this = S::F16::mask_from_bits(1 << packet);
+        self.reach[square] = S::F16::select(this, reach, self.reach[square]);
     }
 }
 
-impl<L, R, T, M, const N: usize, const P: usize, const K: usize> Bundle<L, K>
-    for Nearest<'_, L, R, T, M, N, P, K>
+impl<S, R, T, M, const N: usize, const P: usize, const K: usize> Bundle<S::F16, K>
+    for Nearest<'_, S, R, T, M, N, P, K>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -159,12 +160,12 @@ where
     const WIDEST: f32 = f32::INFINITY;
 
     #[inline(always)]
-    fn reach(&self, square: usize) -> L {
+    fn reach(&self, square: usize) -> S::F16 {
         self.reach[square]
     }
 
     #[inline(always)]
-    fn reach_of_lanes(&self) -> L {
+    fn reach_of_lanes(&self) -> S::F16 {
         greatest_of_lanes(&self.reach)
     }
 
@@ -207,28 +208,83 @@ where
         if self.active[square][packet] == 0 {
             return;
         }
+        let alone = Alone::<R, T, M, N, P> {
+            tree: self.tree,
+            frame: self.beam.frame,
+            rays: &self.rays[square * PACKETS + packet],
+            active: self.active[square][packet],
+            kept: &self.kept[square][packet],
+            closest: &mut self.closest[square][packet],
+            place,
+            depths: Interval { tmin, tmax },
+            mode: PhantomData,
+        };
+        if S::apart(alone) {
+            self.shorten(square, packet);
+        }
+    }
+}
+
+/// The test of a part of a packet, of which that was kept.
+#[inline(always)]
+fn part_test<R: Lanes<N>, M: Mode, const N: usize>(
+    frame: &Frame,
+    rays: &RayPacket<16>,
+    part: usize,
+    kept: &Kept<M, R, N>,
+) -> M::Test<N, R> {
+    let direction = load_part3::<N, R>(&rays.direction, part);
+    M::Test::<N, R>::revive(kept, &frame.apex, &direction, frame.axes[2])
+}
+
+/// A packet that goes on alone, as a beam has it.
+struct Alone<'a, R: Lanes<N>, T, M: Mode, const N: usize, const P: usize> {
+    tree: &'a T,
+    frame: Frame,
+    rays: &'a RayPacket<16>,
+    /// Which of its lanes count.
+    active: u32,
+    kept: &'a [Kept<M, R, N>; P],
+    closest: &'a mut [Closest<N, R>; P],
+    /// The place of the upper tree below which it goes on.
+    place: usize,
+    /// From which depth it does, and to which.
+    depths: Interval<f32>,
+    mode: PhantomData<M>,
+}
+
+impl<R, T, M, const N: usize, const P: usize> Task for Alone<'_, R, T, M, N, P>
+where
+    R: Lanes<N>,
+    T: Records<M>,
+    M: Mode,
+{
+    /// Whether it may have found anything.
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { tree, frame, rays, active, kept, closest, place, depths: Interval { tmin, tmax }, .. } =
+            self;
         let mut changed = false;
         for part in 0..P {
-            let rays = self.rays[square * PACKETS + packet].part::<N>(part);
-            let active = self.lanes(square, packet, part);
-            let (walk, inside) = Walk::<N, R>::new(&rays, active, self.tree.bounds());
-            let speed = R::load(&rays.direction[self.beam.frame.axes[2]]).abs();
-            let mut closest = self.closest[square][packet][part];
+            let of_part = rays.part::<N>(part);
+            let active = active >> (part * N) & ((1 << N) - 1);
+            let (walk, inside) = Walk::<N, R>::new(&of_part, active, tree.bounds());
+            let speed = R::load(&of_part.direction[frame.axes[2]]).abs();
+            let mut found = closest[part];
             let interval = Interval {
                 tmin: (R::splat(tmin - tmin.abs() * ROUNDINGS) / speed).max(inside.tmin),
-                tmax: (R::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(closest.t),
+                tmax: (R::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(found.t),
             };
             if interval.live().any() {
-                let test = self.part_test(square, packet, part);
-                let tnear = R::load(&rays.tnear);
-                let node = self.tree.beneath(place);
-                descend::<N, R, T, M, false>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
-                self.closest[square][packet][part] = closest;
+                let test = part_test::<R, M, N>(&frame, rays, part, &kept[part]);
+                let (tnear, node) = (R::load(&of_part.tnear), tree.beneath(place));
+                descend::<N, R, T, M, false>(tree, &walk, &test, tnear, node, interval, &mut found);
+                closest[part] = found;
                 changed = true;
             }
         }
-        if changed {
-            self.shorten(square, packet);
-        }
+        changed
     }
 }

@@ -11,18 +11,18 @@ use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test, leave};
-use crate::simd::{Lanes, Mask, Sixteen};
+use crate::simd::{Lanes, Mask, Simd, Task};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::RayPacket;
 use crate::traverse::packet::descend;
 use crate::traverse::records::Records;
-use crate::traverse::walk::{Interval, Walk};
+use crate::traverse::walk::{Interval, Walk, load3};
 use std::marker::PhantomData;
 
 /// A square's packets. Rays stand in the lanes of `R`, as many as a register holds.
-pub struct Shadows<'a, L, R, T, M, const N: usize, const PARALLEL: bool>
+pub struct Shadows<'a, S, R, T, M, const N: usize, const PARALLEL: bool>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -36,12 +36,12 @@ where
     pub open: [u32; PACKETS],
     /// The depth beyond which no ray of a packet looks for anything any more.
     reach: [f32; PACKETS],
-    types: PhantomData<(L, R, M)>,
+    types: PhantomData<(S, R, M)>,
 }
 
-impl<'a, L, R, T, M, const N: usize, const PARALLEL: bool> Shadows<'a, L, R, T, M, N, PARALLEL>
+impl<'a, S, R, T, M, const N: usize, const PARALLEL: bool> Shadows<'a, S, R, T, M, N, PARALLEL>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -54,7 +54,7 @@ where
         active: &[u32; PACKETS],
         axis: usize,
         seen: &'a mut Seen,
-        interval: &Interval<L>,
+        interval: &Interval<S::F16>,
     ) -> Self {
         let reach = interval.tmax.store();
         for packet in 0..rays.len().min(PACKETS) {
@@ -83,12 +83,8 @@ where
                 return doubtful;
             }
         }
-        let test = M::Test::<N, R>::new(&origin, &direction, doubtful.bits());
-        let candidate = test.test(self.tree.record_of(primitive), doubtful);
-        // As a packet's closest hit is taken, which is none beyond the greatest float.
-        let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
-        let tnear = load_part::<N, R>(&rays.tnear, part);
-        candidate.inside & doubtful & tnear.le(candidate.t) & candidate.t.le(tfar)
+        let (record, doubtful) = (self.tree.record_of(primitive), doubtful.bits());
+        R::mask_from_bits(S::apart(Doubt::<R, M, N> { rays, part, record, doubtful, types: PhantomData }))
     }
 
     /// Takes note of a part's lanes that found something.
@@ -107,9 +103,10 @@ where
     }
 }
 
-impl<L, R, T, M, const N: usize, const PARALLEL: bool> Bundle<L, 1> for Shadows<'_, L, R, T, M, N, PARALLEL>
+impl<S, R, T, M, const N: usize, const PARALLEL: bool> Bundle<S::F16, 1>
+    for Shadows<'_, S, R, T, M, N, PARALLEL>
 where
-    L: Sixteen,
+    S: Simd,
     R: Lanes<N>,
     T: Records<M>,
     M: Mode,
@@ -122,13 +119,13 @@ where
     const WIDEST: f32 = if PARALLEL { f32::INFINITY } else { 0.1 };
 
     #[inline(always)]
-    fn reach(&self, _: usize) -> L {
-        L::load(&self.reach)
+    fn reach(&self, _: usize) -> S::F16 {
+        S::F16::load(&self.reach)
     }
 
     #[inline(always)]
-    fn reach_of_lanes(&self) -> L {
-        L::load(&self.reach)
+    fn reach_of_lanes(&self) -> S::F16 {
+        S::F16::load(&self.reach)
     }
 
     #[inline(always)]
@@ -193,33 +190,101 @@ where
 
     #[inline(always)]
     fn go_alone(&mut self, _: usize, packet: usize, place: usize, tmin: f32, tmax: f32) {
+        let alone = Alone::<R, T, M, N> {
+            tree: self.tree,
+            rays: &self.rays[packet],
+            open: self.open[packet],
+            start: &self.seen.start[packet],
+            speed: &self.seen.speed[packet],
+            place,
+            depths: Interval { tmin, tmax },
+            types: PhantomData,
+        };
+        let found = S::apart(alone);
+        self.open[packet] &= !found;
+        if self.open[packet] == 0 {
+            self.reach[packet] = f32::NEG_INFINITY;
+        }
+    }
+}
+
+/// Rays of a part of a packet of which it is in doubt whether they hit a triangle.
+struct Doubt<'a, R, M: Mode, const N: usize> {
+    rays: &'a RayPacket<16>,
+    part: usize,
+    record: &'a M::Record,
+    /// A bit for each of them.
+    doubtful: u32,
+    types: PhantomData<R>,
+}
+
+impl<R: Lanes<N>, M: Mode, const N: usize> Task for Doubt<'_, R, M, N> {
+    /// Those that do, by the mode's own test.
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let Self { rays, part, record, doubtful, .. } = self;
+        let origin = load_part3::<N, R>(&rays.origin, part);
+        let direction = load_part3::<N, R>(&rays.direction, part);
+        let test = M::Test::<N, R>::new(&origin, &direction, doubtful);
+        let lanes = R::mask_from_bits(doubtful);
+        let candidate = test.test(record, lanes);
+        // As a packet's closest hit is taken, which is none beyond the greatest float.
+        let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
+        let tnear = load_part::<N, R>(&rays.tnear, part);
+        (candidate.inside & lanes & tnear.le(candidate.t) & candidate.t.le(tfar)).bits()
+    }
+}
+
+/// A packet that goes on alone, as a beam has it.
+struct Alone<'a, R, T, M, const N: usize> {
+    tree: &'a T,
+    rays: &'a RayPacket<16>,
+    /// Its lanes that have found nothing yet.
+    open: u32,
+    /// Where its rays start, as depths, and how fast they run along the axis of depths.
+    start: &'a [f32; 16],
+    speed: &'a [f32; 16],
+    /// The place of the upper tree below which it goes on.
+    place: usize,
+    /// From which depth it does, and to which.
+    depths: Interval<f32>,
+    types: PhantomData<(R, M)>,
+}
+
+impl<R: Lanes<N>, T: Records<M>, M: Mode, const N: usize> Task for Alone<'_, R, T, M, N> {
+    /// The lanes that find something.
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let Self { tree, rays, open, start, speed, place, depths: Interval { tmin, tmax }, .. } = self;
+        let mut all_found = 0;
         for part in 0..16 / N {
-            let lanes = self.open_in(packet, part);
+            let lanes = open >> (part * N) & ((1 << N) - 1);
             if lanes == 0 {
                 continue;
             }
-            let rays = self.rays[packet].part::<N>(part);
-            let (walk, inside) = Walk::<N, R>::new(&rays, lanes, self.tree.bounds());
-            let start = load_part::<N, R>(&self.seen.start[packet], part);
-            let speed = load_part::<N, R>(&self.seen.speed[packet], part);
+            let of_part = rays.part::<N>(part);
+            let (walk, inside) = Walk::<N, R>::new(&of_part, lanes, tree.bounds());
+            let (start, speed) = (load_part::<N, R>(start, part), load_part::<N, R>(speed, part));
             let (one, other) = ((R::splat(tmin) - start) / speed, (R::splat(tmax) - start) / speed);
             let more =
                 (start.abs() + R::splat(tmin.abs().max(tmax.abs()))) / speed.abs() * R::splat(ROUNDINGS);
-            let mut closest = Closest::new(R::load(&rays.tfar));
+            let mut closest = Closest::new(R::load(&of_part.tfar));
             let interval = Interval {
                 tmin: (one.min(other) - more).max(inside.tmin),
                 tmax: (one.max(other) + more).min(inside.tmax),
             };
             if interval.live().any() {
-                let test = M::Test::<N, R>::new(
-                    &load_part3::<N, R>(&self.rays[packet].origin, part),
-                    &load_part3::<N, R>(&self.rays[packet].direction, part),
-                    lanes,
-                );
-                let (tnear, node) = (R::load(&rays.tnear), self.tree.beneath(place));
-                descend::<N, R, T, M, true>(self.tree, &walk, &test, tnear, node, interval, &mut closest);
-                self.close(packet, part, closest.found() & lanes);
+                let (origin, direction) = (load3(&of_part.origin), load3(&of_part.direction));
+                let test = M::Test::<N, R>::new(&origin, &direction, lanes);
+                let (tnear, node) = (R::load(&of_part.tnear), tree.beneath(place));
+                descend::<N, R, T, M, true>(tree, &walk, &test, tnear, node, interval, &mut closest);
+                all_found |= (closest.found() & lanes) << (part * N);
             }
         }
+        all_found
     }
 }
