@@ -183,8 +183,11 @@ where
             ];
             let tnear = load_part::<N, R>(&rays.tnear, part);
             let live = self.counts(square, packet, part);
+            // Out of memory and back: from triangle to triangle it stays in registers.
+            let mut closest = self.closest[square][packet][part];
+            let kept = &self.kept[square][packet][part];
             for triangle in bits(chosen) {
-                let (primitive, kept) = (primitives[triangle], &self.kept[square][packet][part]);
+                let primitive = primitives[triangle];
                 // No `unwrap_or_else`: its closure might stay out of line, and be compiled without the
                 // instruction set.
                 let told = M::Test::<N, R>::test_placed(kept, &direction, &block.placed, triangle, live);
@@ -192,10 +195,10 @@ where
                     Some(candidate) => candidate,
                     None => self.part_test(square, packet, part).test(self.tree.record_of(primitive), live),
                 };
-                let closest = &mut self.closest[square][packet][part];
                 changed |=
                     closest.take::<false>(&candidate, primitive, tnear, live, !M::Test::<N, R>::DEFERS);
             }
+            self.closest[square][packet][part] = closest;
         }
         if changed {
             self.shorten(square, packet);
