@@ -1,8 +1,8 @@
-//! What the walk of a beam asks of the rays in it; and rays cut into what registers hold.
+//! What the walk of a beam asks of the rays in it.
 
 use super::beam::PACKETS;
 use super::outline::Block;
-use crate::simd::{Lanes, Sixteen};
+use crate::simd::Sixteen;
 
 /// The rays of a beam of `K` squares, and what they have found.
 pub trait Bundle<L: Sixteen, const K: usize> {
@@ -59,24 +59,3 @@ pub fn greatest_of_lanes<L: Sixteen, const K: usize>(squares: &[L; K]) -> L {
 
 /// What depths are widened by where they become parameters of rays, relative to themselves.
 pub const ROUNDINGS: f32 = 1.0 / (1 << 20) as f32;
-
-/// A part of a packet's row.
-#[inline(always)]
-pub fn part_of<const N: usize, V>(row: &[V; 16], part: usize) -> &[V; N] {
-    &row.as_chunks::<N>().0[part]
-}
-
-#[inline(always)]
-pub fn part_mut<const N: usize, V>(row: &mut [V; 16], part: usize) -> &mut [V; N] {
-    &mut row.as_chunks_mut::<N>().0[part]
-}
-
-#[inline(always)]
-pub fn load_part<const N: usize, R: Lanes<N>>(row: &[f32; 16], part: usize) -> R {
-    R::load(part_of(row, part))
-}
-
-#[inline(always)]
-pub fn load_part3<const N: usize, R: Lanes<N>>(rows: &[[f32; 16]; 3], part: usize) -> [R; 3] {
-    [load_part(&rows[0], part), load_part(&rows[1], part), load_part(&rows[2], part)]
-}

@@ -40,7 +40,7 @@ use super::closest::Normals;
 use super::lanes::{HitPacket, RayPacket};
 use crate::geometry::triangle::Mode;
 use crate::kdtree::Tree;
-use crate::simd::{Lanes, Mask, Simd, Sixteen};
+use crate::simd::{Mask, Simd, Sixteen};
 use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
 use form::{Form, Seen, Slopes};
@@ -66,11 +66,7 @@ pub fn intersect<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
 ) -> [[u32; PACKETS]; K] {
     let (mut left, mut work) = (*active, 0);
     for _ in 0..BEAMS {
-        let done = if const { S::NATIVE == 16 } {
-            nearest::<S, S::F16, T, M, P, 16, 1, K>(tree, rays, &left, work, hits, probe)
-        } else {
-            nearest::<S, S::F8, T, M, P, 8, 2, K>(tree, rays, &left, work, hits, probe)
-        };
+        let done = nearest::<S, T, M, P, K>(tree, rays, &left, work, hits, probe);
         let Some(so_far) = done.take_from(&mut left) else { break };
         work = so_far;
     }
@@ -89,11 +85,7 @@ pub fn occluded<S: Simd, T: Records<M>, M: Mode, P: Probe>(
 ) -> [u32; PACKETS] {
     let (mut left, mut work) = ([*active], 0);
     for _ in 0..BEAMS {
-        let done = if const { S::NATIVE == 16 } {
-            shadows::<S, S::F16, T, M, P, 16>(tree, rays, &left, work, found, probe)
-        } else {
-            shadows::<S, S::F8, T, M, P, 8>(tree, rays, &left, work, found, probe)
-        };
+        let done = shadows::<S, T, M, P>(tree, rays, &left, work, found, probe);
         let Some(so_far) = done.take_from(&mut left) else { break };
         work = so_far;
     }
@@ -128,23 +120,16 @@ impl<const K: usize> Done<K> {
     }
 }
 
-/// A beam of [`intersect`], with `N` rays to a register, and so packets in `PARTS` parts; which lanes it was.
+/// A beam of [`intersect`]; which lanes it was.
 #[inline(always)]
-fn nearest<S, R, T, M, P, const N: usize, const PARTS: usize, const K: usize>(
+fn nearest<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; K],
     work: u32,
     hits: &mut [HitPacket<16>],
     probe: &mut P,
-) -> Done<K>
-where
-    S: Simd,
-    R: Lanes<N>,
-    T: Records<M>,
-    M: Mode,
-    P: Probe,
-{
+) -> Done<K> {
     if !tree.scale().is_none() {
         return Done::NOTHING;
     }
@@ -160,7 +145,7 @@ where
         miss(&belong, hits);
         return Done { lanes: belong, work: Some(work) };
     }
-    let mut bundle = Nearest::<S, R, T, M, N, PARTS, K>::new(tree, rays, &belong, &beam);
+    let mut bundle = Nearest::<S, T, M, K>::new(tree, rays, &belong, &beam);
     bundle.begin(&slopes);
     let squares = page::windows(&extents, beam.spread.blur::<false>());
     let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
@@ -183,9 +168,9 @@ fn miss<const K: usize>(lanes: &[[u32; PACKETS]; K], hits: &mut [HitPacket<16>])
     }
 }
 
-/// A beam of [`occluded`], with `N` rays to a register; which lanes it was.
+/// A beam of [`occluded`]; which lanes it was.
 #[inline(always)]
-fn shadows<S: Simd, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usize>(
+fn shadows<S: Simd, T: Records<M>, M: Mode, P: Probe>(
     tree: &T,
     rays: &[RayPacket<16>],
     active: &[[u32; PACKETS]; 1],
@@ -204,9 +189,9 @@ fn shadows<S: Simd, R: Lanes<N>, T: Records<M>, M: Mode, P: Probe, const N: usiz
     };
     let trace = Trace { tree, rays, active: &belong, frame, extent, spread };
     let (open, work) = if form == Form::Along {
-        trace.shadows::<S, R, M, P, N, true>(&mut seen, work, probe)
+        trace.shadows::<S, M, P, true>(&mut seen, work, probe)
     } else {
-        trace.shadows::<S, R, M, P, N, false>(&mut seen, work, probe)
+        trace.shadows::<S, M, P, false>(&mut seen, work, probe)
     };
     for ((found, open), belong) in found.iter_mut().zip(open).zip(&belong) {
         *found |= belong & !open;
@@ -227,7 +212,7 @@ struct Trace<'a, L, T> {
 impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
     /// The lanes that find nothing, and the work so far if the beam paid.
     #[inline(always)]
-    fn shadows<S, R, M, P, const N: usize, const PARALLEL: bool>(
+    fn shadows<S, M, P, const PARALLEL: bool>(
         &self,
         seen: &mut Seen,
         work: u32,
@@ -235,7 +220,6 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
     ) -> ([u32; PACKETS], Option<u32>)
     where
         S: Simd<F16 = L>,
-        R: Lanes<N>,
         M: Mode,
         T: Records<M>,
         P: Probe,
@@ -243,7 +227,7 @@ impl<L: Sixteen, T: Tree> Trace<'_, L, T> {
         let Self { tree, rays, active, frame, ref extent, spread } = *self;
         let (beam, interval) = Beam::<L, PARALLEL>::new(frame, extent, spread, tree.bounds());
         let mut bundle =
-            Shadows::<S, R, T, M, N, PARALLEL>::new(tree, rays, active, frame.axes[2], seen, &interval);
+            Shadows::<S, T, M, PARALLEL>::new(tree, rays, active, frame.axes[2], seen, &interval);
         let squares = page::windows(&[*extent], spread.blur::<PARALLEL>());
         let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
         (bundle.open, work)

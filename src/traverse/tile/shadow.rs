@@ -6,12 +6,12 @@
 //! their own origins: those that graze an edge, and those that meet the triangle, or start near it and do not leave it for certain.
 
 use super::beam::PACKETS;
-use super::bundle::{Bundle, ROUNDINGS, load_part, load_part3, part_mut};
+use super::bundle::{Bundle, ROUNDINGS};
 use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test, leave};
-use crate::simd::{Lanes, Mask, Simd, Task};
+use crate::simd::{Lanes, Mask, Simd, Sixteen, Task};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::RayPacket;
 use crate::traverse::packet::descend;
@@ -19,14 +19,8 @@ use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk, load3};
 use std::marker::PhantomData;
 
-/// A square's packets. Rays stand in the lanes of `R`, as many as a register holds.
-pub struct Shadows<'a, S, R, T, M, const N: usize, const PARALLEL: bool>
-where
-    S: Simd,
-    R: Lanes<N>,
-    T: Records<M>,
-    M: Mode,
-{
+/// A square's packets, whose rays stand in sixteen lanes each.
+pub struct Shadows<'a, S, T, M, const PARALLEL: bool> {
     tree: &'a T,
     rays: &'a [RayPacket<16>],
     /// The axis along which all rays run fastest.
@@ -36,16 +30,10 @@ where
     pub open: [u32; PACKETS],
     /// The depth beyond which no ray of a packet looks for anything any more.
     reach: [f32; PACKETS],
-    types: PhantomData<(S, R, M)>,
+    types: PhantomData<(S, M)>,
 }
 
-impl<'a, S, R, T, M, const N: usize, const PARALLEL: bool> Shadows<'a, S, R, T, M, N, PARALLEL>
-where
-    S: Simd,
-    R: Lanes<N>,
-    T: Records<M>,
-    M: Mode,
-{
+impl<'a, S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Shadows<'a, S, T, M, PARALLEL> {
     /// The rays at their start, in `interval`, beyond which nothing is.
     #[inline(always)]
     pub fn new(
@@ -60,56 +48,47 @@ where
         for packet in 0..rays.len().min(PACKETS) {
             // A depth is multiplied by what may be off by a rounding of 1: it must be no farther than the
             // scene is.
-            for part in 0..16 / N {
-                let far = load_part::<N, R>(&seen.far[packet], part).min(R::splat(reach[packet]));
-                *part_mut(&mut seen.far[packet], part) = far.store();
-            }
+            let far = &mut seen.far[packet];
+            *far = S::F16::load(far).min(S::F16::splat(reach[packet])).store();
         }
         Self { tree, rays, axis, seen, open: *active, reach, types: PhantomData }
     }
 
     /// The mode's own test, of the lanes in `doubtful` that do not leave the triangle behind.
     #[inline(always)]
-    fn decide(&self, packet: usize, part: usize, primitive: u32, doubtful: R::Mask) -> R::Mask {
+    fn decide(
+        &self,
+        packet: usize,
+        primitive: u32,
+        doubtful: <S::F16 as Lanes<16>>::Mask,
+    ) -> <S::F16 as Lanes<16>>::Mask {
         let rays = &self.rays[packet];
-        let origin = load_part3::<N, R>(&rays.origin, part);
-        let direction = load_part3::<N, R>(&rays.direction, part);
         let mut doubtful = doubtful;
         if M::SURE {
             // Nearly always it is what they have just left.
+            let (origin, direction) = (load3(&rays.origin), load3(&rays.direction));
             let triangle = self.tree.triangle(primitive);
-            doubtful = doubtful & !leave::<N, R>(triangle, &origin, &direction, self.axis);
+            doubtful = doubtful & !leave::<16, S::F16>(triangle, &origin, &direction, self.axis);
             if !doubtful.any() {
                 return doubtful;
             }
         }
         let (record, doubtful) = (self.tree.record_of(primitive), doubtful.bits());
-        R::mask_from_bits(S::apart(Doubt::<R, M, N> { rays, part, record, doubtful, types: PhantomData }))
+        S::F16::mask_from_bits(S::apart(Doubt::<S::F16, M> { rays, record, doubtful, types: PhantomData }))
     }
 
-    /// Takes note of a part's lanes that found something.
+    /// Takes note of a packet's lanes that found something.
     #[inline(always)]
-    fn close(&mut self, packet: usize, part: usize, found: u32) {
-        self.open[packet] &= !(found << (part * N));
+    fn close(&mut self, packet: usize, found: u32) {
+        self.open[packet] &= !found;
         if self.open[packet] == 0 {
             self.reach[packet] = f32::NEG_INFINITY;
         }
     }
-
-    /// The lanes of a part that have found nothing yet.
-    #[inline(always)]
-    fn open_in(&self, packet: usize, part: usize) -> u32 {
-        self.open[packet] >> (part * N) & ((1 << N) - 1)
-    }
 }
 
-impl<S, R, T, M, const N: usize, const PARALLEL: bool> Bundle<S::F16, 1>
-    for Shadows<'_, S, R, T, M, N, PARALLEL>
-where
-    S: Simd,
-    R: Lanes<N>,
-    T: Records<M>,
-    M: Mode,
+impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
+    for Shadows<'_, S, T, M, PARALLEL>
 {
     // 2560 lost up to a sixth, 8192 as much on others.
     const PATIENCE: u32 = 4096;
@@ -131,66 +110,63 @@ where
     #[inline(always)]
     fn test(&mut self, _: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
         let packet = packet & 15;
-        for part in 0..16 / N {
-            let lanes = self.open_in(packet, part);
-            if lanes == 0 {
+        let lanes = self.open[packet];
+        if lanes == 0 {
+            return;
+        }
+        let mut open = S::F16::mask_from_bits(lanes);
+        let [a, b] = &self.seen.place;
+        let (a, b) = (S::F16::load(&a[packet]), S::F16::load(&b[packet]));
+        let (near, far) = (S::F16::load(&self.seen.near[packet]), S::F16::load(&self.seen.far[packet]));
+        for triangle in bits(chosen) {
+            // On which sides of the edges the rays pass.
+            let (mut least, mut greatest) = (S::F16::splat(f32::INFINITY), S::F16::splat(f32::NEG_INFINITY));
+            for edge in 0..3 {
+                let side = block.side(triangle, edge, a, b);
+                least = least.min(side);
+                greatest = greatest.max(side);
+            }
+            let slack = block.slack_of(triangle);
+            let (above, below) = (S::F16::splat(slack), S::F16::splat(-slack));
+            let maybe_inside = open & !(least.lt(below) & above.lt(greatest));
+            if !maybe_inside.any() {
                 continue;
             }
-            let mut open = R::mask_from_bits(lanes);
-            let [a, b] = &self.seen.place;
-            let (a, b) = (load_part::<N, R>(&a[packet], part), load_part::<N, R>(&b[packet], part));
-            let near = load_part::<N, R>(&self.seen.near[packet], part);
-            let far = load_part::<N, R>(&self.seen.far[packet], part);
-            for triangle in bits(chosen) {
-                // On which sides of the edges the rays pass.
-                let (mut least, mut greatest) = (R::splat(f32::INFINITY), R::splat(f32::NEG_INFINITY));
-                for edge in 0..3 {
-                    let side = block.side(triangle, edge, a, b);
-                    least = least.min(side);
-                    greatest = greatest.max(side);
-                }
-                let slack = block.slack_of(triangle);
-                let (above, below) = (R::splat(slack), R::splat(-slack));
-                let maybe_inside = open & !(least.lt(below) & above.lt(greatest));
-                if !maybe_inside.any() {
-                    continue;
-                }
 
-                // Whether the plane lies between the rays' ends.
-                let [x, y, z, other, slack] = block.plane_of(triangle);
-                let linear = R::splat(x).mul_add(a, R::splat(y).mul_add(b, R::splat(z)));
-                let (other, slack) = (R::splat(other), R::splat(slack));
-                let (at_near, at_far, plane) = if PARALLEL {
-                    (near * other, far * other, linear)
-                } else {
-                    (near * linear, far * linear, other)
-                };
-                let maybe = maybe_inside & !(at_far.lt(plane - slack)) & !((plane + slack).lt(at_near));
-                if !maybe.any() {
-                    continue;
-                }
-                let mut found = maybe & !maybe;
-                if M::SURE {
-                    let inside = above.lt(least) | greatest.lt(below);
-                    let between = (plane + slack).lt(at_far) & at_near.lt(plane - slack);
-                    found = maybe & inside & between;
-                }
-                let doubtful = maybe & !found;
-                if doubtful.any() {
-                    found = found | self.decide(packet, part, primitives[triangle], doubtful);
-                }
-                open = open & !found;
-                if !open.any() {
-                    break;
-                }
+            // Whether the plane lies between the rays' ends.
+            let [x, y, z, other, slack] = block.plane_of(triangle);
+            let linear = S::F16::splat(x).mul_add(a, S::F16::splat(y).mul_add(b, S::F16::splat(z)));
+            let (other, slack) = (S::F16::splat(other), S::F16::splat(slack));
+            let (at_near, at_far, plane) = if PARALLEL {
+                (near * other, far * other, linear)
+            } else {
+                (near * linear, far * linear, other)
+            };
+            let maybe = maybe_inside & !(at_far.lt(plane - slack)) & !((plane + slack).lt(at_near));
+            if !maybe.any() {
+                continue;
             }
-            self.close(packet, part, lanes & !open.bits());
+            let mut found = maybe & !maybe;
+            if M::SURE {
+                let inside = above.lt(least) | greatest.lt(below);
+                let between = (plane + slack).lt(at_far) & at_near.lt(plane - slack);
+                found = maybe & inside & between;
+            }
+            let doubtful = maybe & !found;
+            if doubtful.any() {
+                found = found | self.decide(packet, primitives[triangle], doubtful);
+            }
+            open = open & !found;
+            if !open.any() {
+                break;
+            }
         }
+        self.close(packet, lanes & !open.bits());
     }
 
     #[inline(always)]
     fn go_alone(&mut self, _: usize, packet: usize, place: usize, tmin: f32, tmax: f32) {
-        let alone = Alone::<R, T, M, N> {
+        let alone = Alone::<S::F16, T, M> {
             tree: self.tree,
             rays: &self.rays[packet],
             open: self.open[packet],
@@ -200,48 +176,44 @@ where
             depths: Interval { tmin, tmax },
             types: PhantomData,
         };
-        let found = S::apart(alone);
-        self.open[packet] &= !found;
-        if self.open[packet] == 0 {
-            self.reach[packet] = f32::NEG_INFINITY;
+        if alone.open != 0 {
+            let found = S::apart(alone);
+            self.close(packet, found);
         }
     }
 }
 
-/// Rays of a part of a packet of which it is in doubt whether they hit a triangle.
-struct Doubt<'a, R, M: Mode, const N: usize> {
+/// Rays of a packet of which it is in doubt whether they hit a triangle.
+struct Doubt<'a, L, M: Mode> {
     rays: &'a RayPacket<16>,
-    part: usize,
     record: &'a M::Record,
     /// A bit for each of them.
     doubtful: u32,
-    types: PhantomData<R>,
+    types: PhantomData<L>,
 }
 
-impl<R: Lanes<N>, M: Mode, const N: usize> Task for Doubt<'_, R, M, N> {
+impl<L: Sixteen, M: Mode> Task for Doubt<'_, L, M> {
     /// Those that do, by the mode's own test.
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
-        let Self { rays, part, record, doubtful, .. } = self;
-        let origin = load_part3::<N, R>(&rays.origin, part);
-        let direction = load_part3::<N, R>(&rays.direction, part);
-        let test = M::Test::<N, R>::new(&origin, &direction, doubtful);
-        let lanes = R::mask_from_bits(doubtful);
+        let Self { rays, record, doubtful, .. } = self;
+        let test = M::Test::<16, L>::new(&load3(&rays.origin), &load3(&rays.direction), doubtful);
+        let lanes = L::mask_from_bits(doubtful);
         let candidate = test.test(record, lanes);
         // As a packet's closest hit is taken, which is none beyond the greatest float.
-        let tfar = R::splat(f32::MAX).min(load_part::<N, R>(&rays.tfar, part));
-        let tnear = load_part::<N, R>(&rays.tnear, part);
+        let tfar = L::splat(f32::MAX).min(L::load(&rays.tfar));
+        let tnear = L::load(&rays.tnear);
         (candidate.inside & lanes & tnear.le(candidate.t) & candidate.t.le(tfar)).bits()
     }
 }
 
 /// A packet that goes on alone, as a beam has it.
-struct Alone<'a, R, T, M, const N: usize> {
+struct Alone<'a, L, T, M> {
     tree: &'a T,
     rays: &'a RayPacket<16>,
-    /// Its lanes that have found nothing yet.
+    /// Its lanes that have found nothing yet, of which there are some.
     open: u32,
     /// Where its rays start, as depths, and how fast they run along the axis of depths.
     start: &'a [f32; 16],
@@ -250,41 +222,31 @@ struct Alone<'a, R, T, M, const N: usize> {
     place: usize,
     /// From which depth it does, and to which.
     depths: Interval<f32>,
-    types: PhantomData<(R, M)>,
+    types: PhantomData<(L, M)>,
 }
 
-impl<R: Lanes<N>, T: Records<M>, M: Mode, const N: usize> Task for Alone<'_, R, T, M, N> {
+impl<L: Sixteen, T: Records<M>, M: Mode> Task for Alone<'_, L, T, M> {
     /// The lanes that find something.
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
         let Self { tree, rays, open, start, speed, place, depths: Interval { tmin, tmax }, .. } = self;
-        let mut all_found = 0;
-        for part in 0..16 / N {
-            let lanes = open >> (part * N) & ((1 << N) - 1);
-            if lanes == 0 {
-                continue;
-            }
-            let of_part = rays.part::<N>(part);
-            let (walk, inside) = Walk::<N, R>::new(&of_part, lanes, tree.bounds());
-            let (start, speed) = (load_part::<N, R>(start, part), load_part::<N, R>(speed, part));
-            let (one, other) = ((R::splat(tmin) - start) / speed, (R::splat(tmax) - start) / speed);
-            let more =
-                (start.abs() + R::splat(tmin.abs().max(tmax.abs()))) / speed.abs() * R::splat(ROUNDINGS);
-            let mut closest = Closest::new(R::load(&of_part.tfar));
-            let interval = Interval {
-                tmin: (one.min(other) - more).max(inside.tmin),
-                tmax: (one.max(other) + more).min(inside.tmax),
-            };
-            if interval.live().any() {
-                let (origin, direction) = (load3(&of_part.origin), load3(&of_part.direction));
-                let test = M::Test::<N, R>::new(&origin, &direction, lanes);
-                let (tnear, node) = (R::load(&of_part.tnear), tree.beneath(place));
-                descend::<N, R, T, M, true>(tree, &walk, &test, tnear, node, interval, &mut closest);
-                all_found |= (closest.found() & lanes) << (part * N);
-            }
+        let (walk, inside) = Walk::<16, L>::new(rays, open, tree.bounds());
+        let (start, speed) = (L::load(start), L::load(speed));
+        let (one, other) = ((L::splat(tmin) - start) / speed, (L::splat(tmax) - start) / speed);
+        let more = (start.abs() + L::splat(tmin.abs().max(tmax.abs()))) / speed.abs() * L::splat(ROUNDINGS);
+        let interval = Interval {
+            tmin: (one.min(other) - more).max(inside.tmin),
+            tmax: (one.max(other) + more).min(inside.tmax),
+        };
+        if !interval.live().any() {
+            return 0;
         }
-        all_found
+        let test = M::Test::<16, L>::new(&load3(&rays.origin), &load3(&rays.direction), open);
+        let mut closest = Closest::new(L::load(&rays.tfar));
+        let (tnear, node) = (L::load(&rays.tnear), tree.beneath(place));
+        descend::<16, L, T, M, true>(tree, &walk, &test, tnear, node, interval, &mut closest);
+        closest.found() & open
     }
 }
