@@ -186,6 +186,18 @@ impl<L: Eight> Sixteen for Pair<L> {
         Self(self.pick_half(ids.0), self.pick_half(ids.1))
     }
     #[inline(always)]
+    fn compact(self, bits: u32, to: &mut [f32; 16]) {
+        let [first, second] = places_of_halves(bits);
+        self.0.compact(bits & 0xff, first_of(to, first));
+        self.1.compact(bits >> 8 & 0xff, first_of(to, second));
+    }
+    #[inline(always)]
+    fn ids_compact(ids: Self::Ids, bits: u32, to: &mut [i32; 16]) {
+        let [first, second] = places_of_halves(bits);
+        L::ids_compact(ids.0, bits & 0xff, first_of(to, first));
+        L::ids_compact(ids.1, bits >> 8 & 0xff, first_of(to, second));
+    }
+    #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
         let [a, b, c, d] = half_of_fours::<L>(fours, 0);
         let [e, f, g, h] = half_of_fours::<L>(fours, 8);
@@ -204,6 +216,18 @@ impl<L: Eight> Sixteen for Pair<L> {
         }
         fours
     }
+}
+
+/// Where the lanes of each half begin whose bits are set, when they are written one behind the other.
+#[inline(always)]
+fn places_of_halves(bits: u32) -> [usize; 2] {
+    [0, (bits & 0xff).count_ones() as usize]
+}
+
+/// Eight of sixteen, from a place of the first nine on.
+#[inline(always)]
+fn first_of<T>(all: &mut [T; 16], place: usize) -> &mut [T; 8] {
+    all[place.min(8)..].first_chunk_mut().expect("eight of sixteen")
 }
 
 /// [`Sixteen::of_fours`] of the eight from `first` on.
