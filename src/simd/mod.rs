@@ -2,7 +2,8 @@
 //!
 //! A kernel is written once, generic over [`Lanes`], and handed to [`Chosen::run`] as a
 //! [`Task`]. `run` enters one function per instruction set that carries `#[target_feature]`;
-//! everything below it is `#[inline(always)]` and so is compiled for that instruction set.
+//! everything below it is `#[inline(always)]` and so is compiled for that instruction set. What several
+//! kernels share, and what is long and seldom, is a task of its own that they run by [`Simd::apart`].
 //! A stock build is therefore fast on every x86-64, and `wide` alone, which chooses at compile
 //! time, serves as the portable implementation and as the reference.
 //!

@@ -256,3 +256,37 @@ fn what_is_detected_is_available() {
     assert!(Isa::available().contains(&Isa::detect()));
     assert!(Isa::available().contains(&Isa::Portable));
 }
+
+/// Says which instruction set it is compiled for.
+struct Name;
+
+impl Task for Name {
+    type Output = &'static str;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> &'static str {
+        std::any::type_name::<S>()
+    }
+}
+
+/// The same, and that of what it does apart.
+struct NameApart;
+
+impl Task for NameApart {
+    type Output = [&'static str; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> [&'static str; 2] {
+        [std::any::type_name::<S>(), S::apart(Name)]
+    }
+}
+
+#[test]
+fn what_is_done_apart_is_compiled_for_the_same_instruction_set() {
+    for isa in Isa::available() {
+        let [here, apart] = Chosen::new(isa).expect("available").run(NameApart);
+        assert_eq!(here, apart, "{isa}");
+        assert!(here.to_lowercase().ends_with(isa.name()), "{isa} is {here}");
+    }
+    assert_eq!(run_portable(NameApart)[0], run_portable(Name));
+}
