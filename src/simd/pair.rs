@@ -187,15 +187,13 @@ impl<L: Eight> Sixteen for Pair<L> {
     }
     #[inline(always)]
     fn compact(self, bits: u32, to: &mut [f32; 16]) {
-        let [first, second] = places_of_halves(bits);
-        self.0.compact(bits & 0xff, first_of(to, first));
-        self.1.compact(bits >> 8 & 0xff, first_of(to, second));
+        self.0.compact(bits & 0xff, eight_from(0, to));
+        self.1.compact(bits >> 8 & 0xff, eight_from(set_in_low(bits), to));
     }
     #[inline(always)]
     fn ids_compact(ids: Self::Ids, bits: u32, to: &mut [i32; 16]) {
-        let [first, second] = places_of_halves(bits);
-        L::ids_compact(ids.0, bits & 0xff, first_of(to, first));
-        L::ids_compact(ids.1, bits >> 8 & 0xff, first_of(to, second));
+        L::ids_compact(ids.0, bits & 0xff, eight_from(0, to));
+        L::ids_compact(ids.1, bits >> 8 & 0xff, eight_from(set_in_low(bits), to));
     }
     #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {
@@ -218,15 +216,15 @@ impl<L: Eight> Sixteen for Pair<L> {
     }
 }
 
-/// Where the lanes of each half begin whose bits are set, when they are written one behind the other.
+/// How many bits are set for lanes of the low half.
 #[inline(always)]
-fn places_of_halves(bits: u32) -> [usize; 2] {
-    [0, (bits & 0xff).count_ones() as usize]
+fn set_in_low(bits: u32) -> usize {
+    (bits & 0xff).count_ones() as usize
 }
 
-/// Eight of sixteen, from a place of the first nine on.
+/// Eight of sixteen, from one of the first nine places on.
 #[inline(always)]
-fn first_of<T>(all: &mut [T; 16], place: usize) -> &mut [T; 8] {
+fn eight_from<T>(place: usize, all: &mut [T; 16]) -> &mut [T; 8] {
     all[place.min(8)..].first_chunk_mut().expect("eight of sixteen")
 }
 

@@ -11,7 +11,7 @@ use super::form::Seen;
 use super::outline::Block;
 use super::page::bits;
 use crate::geometry::triangle::{Mode, Test, leave};
-use crate::simd::{Lanes, Mask, Simd, Sixteen, Task};
+use crate::simd::{Lanes, Mask, Simd, Task};
 use crate::traverse::closest::Closest;
 use crate::traverse::lanes::RayPacket;
 use crate::traverse::packet::descend;
@@ -74,7 +74,7 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Shadows<'a, S, T
             }
         }
         let (record, doubtful) = (self.tree.record_of(primitive), doubtful.bits());
-        S::F16::mask_from_bits(S::apart(Doubt::<S::F16, M> { rays, record, doubtful, types: PhantomData }))
+        S::F16::mask_from_bits(S::apart(Doubt::<M> { rays, record, doubtful }))
     }
 
     /// Takes note of a packet's lanes that found something.
@@ -166,7 +166,10 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
 
     #[inline(always)]
     fn go_alone(&mut self, _: usize, packet: usize, place: usize, tmin: f32, tmax: f32) {
-        let alone = Alone::<S::F16, T, M> {
+        if self.open[packet] == 0 {
+            return;
+        }
+        let found = S::apart(Alone::<T, M> {
             tree: self.tree,
             rays: &self.rays[packet],
             open: self.open[packet],
@@ -174,43 +177,39 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
             speed: &self.seen.speed[packet],
             place,
             depths: Interval { tmin, tmax },
-            types: PhantomData,
-        };
-        if alone.open != 0 {
-            let found = S::apart(alone);
-            self.close(packet, found);
-        }
+            mode: PhantomData,
+        });
+        self.close(packet, found);
     }
 }
 
 /// Rays of a packet of which it is in doubt whether they hit a triangle.
-struct Doubt<'a, L, M: Mode> {
+struct Doubt<'a, M: Mode> {
     rays: &'a RayPacket<16>,
     record: &'a M::Record,
     /// A bit for each of them.
     doubtful: u32,
-    types: PhantomData<L>,
 }
 
-impl<L: Sixteen, M: Mode> Task for Doubt<'_, L, M> {
+impl<M: Mode> Task for Doubt<'_, M> {
     /// Those that do, by the mode's own test.
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
-        let Self { rays, record, doubtful, .. } = self;
-        let test = M::Test::<16, L>::new(&load3(&rays.origin), &load3(&rays.direction), doubtful);
-        let lanes = L::mask_from_bits(doubtful);
+        let Self { rays, record, doubtful } = self;
+        let test = M::Test::<16, S::F16>::new(&load3(&rays.origin), &load3(&rays.direction), doubtful);
+        let lanes = S::F16::mask_from_bits(doubtful);
         let candidate = test.test(record, lanes);
         // As a packet's closest hit is taken, which is none beyond the greatest float.
-        let tfar = L::splat(f32::MAX).min(L::load(&rays.tfar));
-        let tnear = L::load(&rays.tnear);
+        let tfar = S::F16::splat(f32::MAX).min(S::F16::load(&rays.tfar));
+        let tnear = S::F16::load(&rays.tnear);
         (candidate.inside & lanes & tnear.le(candidate.t) & candidate.t.le(tfar)).bits()
     }
 }
 
 /// A packet that goes on alone, as a beam has it.
-struct Alone<'a, L, T, M> {
+struct Alone<'a, T, M> {
     tree: &'a T,
     rays: &'a RayPacket<16>,
     /// Its lanes that have found nothing yet, of which there are some.
@@ -222,20 +221,21 @@ struct Alone<'a, L, T, M> {
     place: usize,
     /// From which depth it does, and to which.
     depths: Interval<f32>,
-    types: PhantomData<(L, M)>,
+    mode: PhantomData<M>,
 }
 
-impl<L: Sixteen, T: Records<M>, M: Mode> Task for Alone<'_, L, T, M> {
+impl<T: Records<M>, M: Mode> Task for Alone<'_, T, M> {
     /// The lanes that find something.
     type Output = u32;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> u32 {
         let Self { tree, rays, open, start, speed, place, depths: Interval { tmin, tmax }, .. } = self;
-        let (walk, inside) = Walk::<16, L>::new(rays, open, tree.bounds());
-        let (start, speed) = (L::load(start), L::load(speed));
-        let (one, other) = ((L::splat(tmin) - start) / speed, (L::splat(tmax) - start) / speed);
-        let more = (start.abs() + L::splat(tmin.abs().max(tmax.abs()))) / speed.abs() * L::splat(ROUNDINGS);
+        let (walk, inside) = Walk::<16, S::F16>::new(rays, open, tree.bounds());
+        let (start, speed) = (S::F16::load(start), S::F16::load(speed));
+        let (one, other) = ((S::F16::splat(tmin) - start) / speed, (S::F16::splat(tmax) - start) / speed);
+        let more = (start.abs() + S::F16::splat(tmin.abs().max(tmax.abs()))) / speed.abs()
+            * S::F16::splat(ROUNDINGS);
         let interval = Interval {
             tmin: (one.min(other) - more).max(inside.tmin),
             tmax: (one.max(other) + more).min(inside.tmax),
@@ -243,10 +243,10 @@ impl<L: Sixteen, T: Records<M>, M: Mode> Task for Alone<'_, L, T, M> {
         if !interval.live().any() {
             return 0;
         }
-        let test = M::Test::<16, L>::new(&load3(&rays.origin), &load3(&rays.direction), open);
-        let mut closest = Closest::new(L::load(&rays.tfar));
-        let (tnear, node) = (L::load(&rays.tnear), tree.beneath(place));
-        descend::<16, L, T, M, true>(tree, &walk, &test, tnear, node, interval, &mut closest);
+        let test = M::Test::<16, S::F16>::new(&load3(&rays.origin), &load3(&rays.direction), open);
+        let mut closest = Closest::new(S::F16::load(&rays.tfar));
+        let (tnear, node) = (S::F16::load(&rays.tnear), tree.beneath(place));
+        descend::<16, S::F16, T, M, true>(tree, &walk, &test, tnear, node, interval, &mut closest);
         closest.found() & open
     }
 }
