@@ -156,6 +156,10 @@ macro_rules! avx2_lanes {
                 avx!($to_int($blend($to_float(b), $to_float(a), mask.0)))
             }
             #[inline(always)]
+            fn ids_with(mask: $mask, ids: $int, bits: i32) -> $int {
+                avx!($to_int($or($to_float(ids), $and(mask.0, $to_float($iset(bits))))))
+            }
+            #[inline(always)]
             fn ids_store(ids: $int) -> [i32; $width] {
                 let mut values = [0; $width];
                 avx!($istore(values.as_mut_ptr().cast(), ids));

@@ -173,6 +173,10 @@ impl Lanes<16> for F32x16 {
         avx512!(_mm512_mask_blend_epi32(mask.0, b, a))
     }
     #[inline(always)]
+    fn ids_with(mask: Mask16, ids: __m512i, bits: i32) -> __m512i {
+        avx512!(_mm512_mask_or_epi32(ids, mask.0, ids, Self::ids(bits)))
+    }
+    #[inline(always)]
     fn ids_store(ids: __m512i) -> [i32; 16] {
         let mut values = [0; 16];
         avx512!(_mm512_storeu_si512(values.as_mut_ptr().cast(), ids));
@@ -211,19 +215,15 @@ fn side_by_side(fours: [&[f32; 4]; 4]) -> __m512 {
     avx512!(_mm512_insertf32x4::<3>(row, _mm_loadu_ps(d.as_ptr())))
 }
 
-/// Sixteen rows folded into one: lane `i` is what is left of what counts in row `i`. Two rows at a time, what is left of
-/// each half as long, so that it takes 45 operations instead of 8 for each row.
-macro_rules! fold_rows {
-    ($rows:expr, $counted:expr, $other:expr, $of:ident) => {{
-        let other = Self::splat($other);
-        let mut rows = [other; 16];
-        for i in 0..16 {
-            rows[i] = Self::select(Mask16($counted[i] as u16), Self::load(&$rows[i]), other);
-        }
-        let mut fours = [other; 4];
+/// Sixteen vectors folded into one: lane `i` is what is left of vector `i`. Two vectors at a time, what is left of
+/// each half as long, so that it takes 45 operations instead of 8 for each vector.
+macro_rules! fold_each {
+    ($vectors:expr, $of:ident) => {{
+        let vectors = $vectors;
+        let mut fours = [vectors[0]; 4];
         for i in 0..4 {
-            let [a, b, c, d] = [rows[4 * i], rows[4 * i + 1], rows[4 * i + 2], rows[4 * i + 3]];
-            // Within quarters: of four rows, a lane each.
+            let [a, b, c, d] = [vectors[4 * i], vectors[4 * i + 1], vectors[4 * i + 2], vectors[4 * i + 3]];
+            // Within quarters: of four vectors, a lane each.
             let ab = avx512!($of(_mm512_unpacklo_ps(a.0, b.0), _mm512_unpackhi_ps(a.0, b.0)));
             let cd = avx512!($of(_mm512_unpacklo_ps(c.0, d.0), _mm512_unpackhi_ps(c.0, d.0)));
             let (low, high) =
@@ -321,12 +321,12 @@ impl Sixteen for F32x16 {
         Self(avx512!(_mm512_permutexvar_ps(quarters(part), self.0)))
     }
     #[inline(always)]
-    fn least_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
-        fold_rows!(rows, counted, f32::INFINITY, _mm512_min_ps)
+    fn least_of_each(vectors: &[Self; 16]) -> Self {
+        fold_each!(vectors, _mm512_min_ps)
     }
     #[inline(always)]
-    fn greatest_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
-        fold_rows!(rows, counted, f32::NEG_INFINITY, _mm512_max_ps)
+    fn greatest_of_each(vectors: &[Self; 16]) -> Self {
+        fold_each!(vectors, _mm512_max_ps)
     }
     #[inline(always)]
     fn of_fours(fours: &[&[f32; 4]; 16]) -> [Self; 4] {

@@ -90,6 +90,8 @@ pub trait Lanes<const W: usize>:
     fn ids_less(a: Self::Ids, b: Self::Ids) -> Self::Mask;
     /// `mask ? a : b`, lane by lane.
     fn ids_select(mask: Self::Mask, a: Self::Ids, b: Self::Ids) -> Self::Ids;
+    /// `mask ? ids | bits : ids`, lane by lane.
+    fn ids_with(mask: Self::Mask, ids: Self::Ids, bits: i32) -> Self::Ids;
     /// Lane `i` becomes element `i`.
     fn ids_store(ids: Self::Ids) -> [i32; W];
 

@@ -142,6 +142,10 @@ impl<L: Lanes<8>> Lanes<16> for Pair<L> {
         Pair(L::ids_select(mask.0, a.0, b.0), L::ids_select(mask.1, a.1, b.1))
     }
     #[inline(always)]
+    fn ids_with(mask: Self::Mask, ids: Self::Ids, bits: i32) -> Self::Ids {
+        Pair(L::ids_with(mask.0, ids.0, bits), L::ids_with(mask.1, ids.1, bits))
+    }
+    #[inline(always)]
     fn ids_store(ids: Self::Ids) -> [i32; 16] {
         joined(L::ids_store(ids.0), L::ids_store(ids.1))
     }

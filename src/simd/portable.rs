@@ -136,6 +136,11 @@ macro_rules! portable_lanes {
                 cast(mask.0.bitselect(cast(a), cast(b)))
             }
             #[inline(always)]
+            fn ids_with(mask: $mask, ids: wide::$int, bits: i32) -> wide::$int {
+                let mask: wide::$int = cast(mask.0);
+                ids | (mask & wide::$int::splat(bits))
+            }
+            #[inline(always)]
             fn ids_store(ids: wide::$int) -> [i32; $width] {
                 ids.to_array()
             }

@@ -74,6 +74,10 @@ impl Lanes<1> for f32 {
         if mask { a } else { b }
     }
     #[inline(always)]
+    fn ids_with(mask: bool, ids: i32, bits: i32) -> i32 {
+        if mask { ids | bits } else { ids }
+    }
+    #[inline(always)]
     fn ids_store(ids: i32) -> [i32; 1] {
         [ids]
     }

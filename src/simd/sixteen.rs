@@ -115,27 +115,37 @@ pub trait Sixteen: Lanes<16> {
         }
     }
 
+    /// The least lane of each of sixteen vectors: that of vector `i` in lane `i`. No lane may be NaN.
+    #[inline(always)]
+    fn least_of_each(vectors: &[Self; 16]) -> Self {
+        let mut least = [0.0; 16];
+        for i in 0..16 {
+            least[i] = vectors[i].least();
+        }
+        Self::load(&least)
+    }
+
+    /// The greatest likewise.
+    #[inline(always)]
+    fn greatest_of_each(vectors: &[Self; 16]) -> Self {
+        let mut greatest = [0.0; 16];
+        for i in 0..16 {
+            greatest[i] = vectors[i].greatest();
+        }
+        Self::load(&greatest)
+    }
+
     /// The least number of each row among those whose bit is set in `counted`: that of row `i` in lane `i`, infinity
     /// if there is none. None that counts may be NaN.
     #[inline(always)]
     fn least_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
-        let mut least = [0.0; 16];
-        for i in 0..16 {
-            let (counts, row) = (Self::mask_from_bits(counted[i]), Self::load(&rows[i]));
-            least[i] = Self::select(counts, row, Self::splat(f32::INFINITY)).least();
-        }
-        Self::load(&least)
+        Self::least_of_each(&counted_of_rows(rows, counted, f32::INFINITY))
     }
 
     /// The greatest number of each row likewise, minus infinity if there is none.
     #[inline(always)]
     fn greatest_of_rows(rows: &[[f32; 16]; 16], counted: &[u32; 16]) -> Self {
-        let mut greatest = [0.0; 16];
-        for i in 0..16 {
-            let (counts, row) = (Self::mask_from_bits(counted[i]), Self::load(&rows[i]));
-            greatest[i] = Self::select(counts, row, Self::splat(f32::NEG_INFINITY)).greatest();
-        }
-        Self::load(&greatest)
+        Self::greatest_of_each(&counted_of_rows(rows, counted, f32::NEG_INFINITY))
     }
 
     /// Four vectors' sixty-four lanes, four to one: the least of lanes `4 j` to `4 j + 3` of vector `i` in lane
@@ -174,4 +184,15 @@ fn fold_fours<L: Sixteen>(vectors: &[L; 4], of: impl Fn(f32, f32) -> f32) -> L {
         }
     }
     L::load(&folded)
+}
+
+/// Rows' numbers whose bit is set in `counted`, and `other` in place of the rest.
+#[inline(always)]
+fn counted_of_rows<L: Sixteen>(rows: &[[f32; 16]; 16], counted: &[u32; 16], other: f32) -> [L; 16] {
+    let other = L::splat(other);
+    let mut counts = [other; 16];
+    for i in 0..16 {
+        counts[i] = L::select(L::mask_from_bits(counted[i]), L::load(&rows[i]), other);
+    }
+    counts
 }

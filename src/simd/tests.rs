@@ -75,6 +75,14 @@ fn check<const W: usize, L: Lanes<W>>() {
         }
         assert_eq!(L::ids_less(ids, L::ids(shift as i32 + 1)).bits() & full, pattern);
 
+        for (i, with) in L::ids_store(L::ids_with(mask, ids, 0x155)).into_iter().enumerate() {
+            assert_eq!(with, if pattern >> i & 1 == 1 { shift as i32 | 0x155 } else { i32::MAX });
+        }
+        assert_eq!(
+            L::ids_store(L::ids_with(!mask, L::ids(6), 3)),
+            std::array::from_fn(|i| 6 | (!pattern >> i & 1) as i32 * 3)
+        );
+
         // Of an id only the last bits count.
         let tagged = x.tag(ids);
         let (begins, tags) = (L::of_tagged(tagged).store(), L::ids_store(L::tags(tagged)));

@@ -14,26 +14,29 @@ pub const NONE: i32 = i32::MAX;
 /// A hit's id as the library gives it.
 const _: () = assert!(NO_PRIMITIVE > NONE as u32);
 
-/// Normals of triangles, one after the other: neighbouring packets mostly hit the same, so that the last one is remembered.
-pub struct Normals {
-    primitive: u32,
-    normal: Vec3,
+/// Normals of triangles: neighbouring packets mostly hit the same few, so that `N` of them are remembered.
+pub struct Normals<const N: usize> {
+    /// Whose they are, each at the place that its id tells.
+    primitives: [u32; N],
+    normals: [Vec3; N],
 }
 
-impl Normals {
+impl<const N: usize> Normals<N> {
     /// None so far.
     #[inline(always)]
     pub const fn new() -> Self {
-        Self { primitive: NO_PRIMITIVE, normal: Vec3::ZERO }
+        Self { primitives: [NO_PRIMITIVE; N], normals: [Vec3::ZERO; N] }
     }
 
     /// The normal of a triangle that was entered.
     #[inline(always)]
     fn of<T: Tree>(&mut self, tree: &T, primitive: u32) -> Vec3 {
-        if primitive != self.primitive {
-            *self = Self { primitive, normal: triangle::normal(tree.corners(primitive)) };
+        let place = primitive as usize % N;
+        if primitive != self.primitives[place] {
+            (self.primitives[place], self.normals[place]) =
+                (primitive, triangle::normal(tree.corners(primitive)));
         }
-        self.normal
+        self.normals[place]
     }
 }
 
@@ -55,11 +58,22 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
         Self { t: L::splat(f32::MAX).min(tfar), u: zero, v: zero, primitive: L::ids(NONE) }
     }
 
-    /// What was found before: the closest `t` or `tfar`, and ids or [`NONE`]. Weights are not kept.
+    /// What was found before: the closest `t` or `tfar`, and ids or [`NONE`]; and the weights, if they were kept.
     #[inline(always)]
-    pub fn of_found(t: L, primitive: L::Ids) -> Self {
-        let zero = L::splat(0.0);
-        Self { t, u: zero, v: zero, primitive }
+    pub fn of_found(t: L, primitive: L::Ids, [u, v]: [L; 2]) -> Self {
+        Self { t, u, v, primitive }
+    }
+
+    /// The ids of what was found, [`NONE`] in the other lanes.
+    #[inline(always)]
+    pub fn ids(&self) -> L::Ids {
+        self.primitive
+    }
+
+    /// The weights, if they were kept.
+    #[inline(always)]
+    pub fn weights(&self) -> [L; 2] {
+        [self.u, self.v]
     }
 
     /// Takes up what a triangle's test found in the lanes `live`: the least `t`, then the lowest id.
@@ -110,11 +124,11 @@ impl<const W: usize, L: Lanes<W>> Closest<W, L> {
     /// Hit records, with what belongs to the triangles filled in. If weights were not kept, `test` finds
     /// them again.
     #[inline(always)]
-    pub fn records<T: Records<M>, M: Mode>(
+    pub fn records<T: Records<M>, M: Mode, const N: usize>(
         &self,
         tree: &T,
         test: Option<&M::Test<W, L>>,
-        normals: &mut Normals,
+        normals: &mut Normals<N>,
     ) -> HitPacket<W> {
         let found = L::ids_less(self.primitive, L::ids(NONE));
         let ids = L::ids_store(L::ids_select(found, self.primitive, L::ids(NO_PRIMITIVE as i32)));

@@ -38,7 +38,7 @@ pub fn intersect<const W: usize, L: Lanes<W>, T: Records<M>, M: Mode>(
     let adapted = (!is_ordinary::<W, L>(rays, active, tree.scale())).then(|| adapt(rays, tree.scale()));
     let traced = adapted.as_ref().map_or(rays, |adapted| &adapted.rays);
     let mut hits =
-        walk::<W, L, T, M, false>(tree, traced, active).records::<T, M>(tree, None, &mut Normals::new());
+        walk::<W, L, T, M, false>(tree, traced, active).records::<T, M, 1>(tree, None, &mut Normals::new());
     if let Some(adapted) = adapted {
         adapted.undo(rays, &mut hits, tree);
     }

@@ -192,7 +192,7 @@ fn rays_to_a_light_go_together_and_see_the_same() {
         ("a small ring", mapped(&twisted_ring(48, 6, 1).mesh, |p| p * 1e-3), Vec3::ZERO, 1e-3),
     ] {
         let mut scene = Scene::new(name, 0, mesh);
-        let (mut meeting, mut parallel) = (0, 0);
+        let (mut meeting, mut parallel, mut diagonal) = (0, 0, 0);
         for seed in seeds() {
             scene.seed = seed;
             let mut numbers = Numbers::new(seed, 45);
@@ -215,15 +215,22 @@ fn rays_to_a_light_go_together_and_see_the_same() {
                 scene.trace(&rays);
                 meeting += beams(&scene.mesh, &rays, true);
             }
-            // Slanting, straight along an axis, and in a coordinate plane.
-            for way in [numbers.direction(), Vec3::Y, -Vec3::Z, Vec3::new(0.5, 0.0, 2.0)] {
+            // Slanting, straight along an axis, in a coordinate plane, and as fast along one axis as along others.
+            let plain = [numbers.direction(), Vec3::Y, -Vec3::Z, Vec3::new(0.5, 0.0, 2.0)];
+            let diagonals = [Vec3::ONE, Vec3::new(0.0, -2.0, 2.0), Vec3::new(-3.0, 1.0, 3.0)];
+            for way in plain.into_iter().chain(diagonals) {
                 let rays: Vec<Ray> = points
                     .iter()
                     .map(|&point| Ray::new(point, way))
                     .chain(points.iter().map(|&point| Ray::segment(point, way, size * 0.01, size * 0.7)))
                     .collect();
                 scene.trace(&rays);
-                parallel += beams(&scene.mesh, &rays, true);
+                let found = beams(&scene.mesh, &rays, true);
+                if diagonals.contains(&way) {
+                    diagonal += found;
+                } else {
+                    parallel += found;
+                }
                 // One that starts nowhere among them.
                 let mut rays = rays[..rays.len().min(512)].to_vec();
                 for (place, coordinate) in [(40, f32::NAN), (300, f32::NEG_INFINITY)] {
@@ -234,7 +241,10 @@ fn rays_to_a_light_go_together_and_see_the_same() {
                 scene.trace(&rays);
             }
         }
-        assert!(meeting > 0 && parallel > 0, "{name}: {meeting} beams toward lights, {parallel} parallel");
+        assert!(
+            meeting > 0 && parallel > 0 && diagonal > 0,
+            "{name}: {meeting} beams toward lights, {parallel} parallel, {diagonal} along diagonals"
+        );
     }
 }
 

@@ -87,12 +87,13 @@ pub struct Lines<const W: usize, L: Lanes<W>> {
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Lines<W, L> {
     type Record = Projected;
     type Kept = ();
+    type Weights = [L; 2];
 
     #[inline(always)]
-    fn keep(_slopes: [L; 2], _along: L) {}
+    fn keep(_along: L) {}
 
     #[inline(always)]
-    fn revive(_kept: &(), apex: &[f32; 3], direction: &Lanes3<L>, _axis: usize) -> Self {
+    fn revive(_kept: &(), _slopes: [L; 2], apex: &[f32; 3], direction: &Lanes3<L>, _axis: usize) -> Self {
         Self { origin: [L::splat(apex[0]), L::splat(apex[1]), L::splat(apex[2])], direction: *direction }
     }
 

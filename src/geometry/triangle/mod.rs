@@ -21,7 +21,7 @@ pub use accuracy::Accuracy;
 pub use leaving::leave;
 pub use placed::{Placed, Row, side};
 pub use record::Triangle;
-pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Own, Test, Watertight};
+pub use test::{Alone, Candidate, Exact, Fast, Finds, Lanes3, Mode, Own, Test, Watertight, Weights};
 pub use watertight::pooled;
 
 use glam::{DVec3, Vec3};

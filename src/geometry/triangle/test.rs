@@ -14,19 +14,23 @@ pub type Lanes3<L> = [L; 3];
 pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// What is kept of each triangle for this test.
     type Record;
-    /// What is kept of rays that start at one point and whose directions are greatest along one axis, to
+    /// What is kept, beside their slopes, of rays that start at one point and whose directions are greatest along one axis, to
     /// be prepared again in no time.
     type Kept: Copy + Default;
+    /// What is kept of a hit's weights: they themselves, or nothing if [`test_placed`](Self::test_placed) gives none, for
+    /// [`weigh`](Self::weigh) to be asked for them in the end.
+    type Weights: Weights<W, L>;
 
     /// Prepares `W` rays. `active` has a bit for each lane that matters.
     fn new(origin: &Lanes3<L>, direction: &Lanes3<L>, active: u32) -> Self;
 
-    /// What to keep of rays whose directions are greatest along an axis: `along` is what they are there, and `slopes` are
-    /// the quotients of the other two, renamed as `RENAMED` says, and `along`.
-    fn keep(slopes: [L; 2], along: L) -> Self::Kept;
+    /// What to keep of rays whose directions are greatest along an axis: `along` is what they are there.
+    fn keep(along: L) -> Self::Kept;
 
-    /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept.
-    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self;
+    /// What [`new`](Self::new) gives for rays that start at `apex`, of which something was kept. `slopes` are the quotients of
+    /// the directions' other two coordinates, renamed as `RENAMED` says, and the one along `axis`.
+    fn revive(kept: &Self::Kept, slopes: [L; 2], apex: &[f32; 3], direction: &Lanes3<L>, axis: usize)
+    -> Self;
 
     /// One triangle against the lanes in `lanes`; what the others answer means nothing.
     ///
@@ -40,15 +44,13 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     /// depends on what they do.
     fn sift(&self, triangle: &Self::Record, lanes: L::Mask) -> L::Mask;
 
-    /// Whether `test_placed` gives no weights, for [`test`](Self::test) to be asked for them in the end.
-    const DEFERS: bool = false;
-
     /// What [`test`](Self::test) answers of the triangle `which` of those in `placed`, to the bit, if that can be
-    /// told from what was kept of rays from the apex that they were prepared for, and from the rays' directions,
+    /// told from what was kept of rays from the apex that they were prepared for, and from the rays' slopes and directions,
     /// renamed likewise. `None` if not. What is said of lanes that are not in `lanes` means nothing.
     #[inline(always)]
     fn test_placed(
         _kept: &Self::Kept,
+        _slopes: [L; 2],
         _direction: &Lanes3<L>,
         _placed: &Placed,
         _which: usize,
@@ -69,6 +71,44 @@ pub trait Test<const W: usize, L: Lanes<W>>: Copy {
     #[inline(always)]
     fn weights(_triangle: &Self::Record, u: L, v: L) -> [L; 2] {
         [u, v]
+    }
+}
+
+/// What is kept of a hit's weights.
+pub trait Weights<const W: usize, L: Lanes<W>>: Copy {
+    /// Whether they are kept.
+    const ARE_KEPT: bool;
+
+    /// What is kept of them.
+    fn of(weights: [L; 2]) -> Self;
+
+    /// The weights, if they are kept; zeros if not.
+    fn get(self) -> [L; 2];
+}
+
+impl<const W: usize, L: Lanes<W>> Weights<W, L> for [L; 2] {
+    const ARE_KEPT: bool = true;
+
+    #[inline(always)]
+    fn of(weights: [L; 2]) -> Self {
+        weights
+    }
+
+    #[inline(always)]
+    fn get(self) -> [L; 2] {
+        self
+    }
+}
+
+impl<const W: usize, L: Lanes<W>> Weights<W, L> for () {
+    const ARE_KEPT: bool = false;
+
+    #[inline(always)]
+    fn of(_: [L; 2]) {}
+
+    #[inline(always)]
+    fn get(self) -> [L; 2] {
+        [L::splat(0.0); 2]
     }
 }
 

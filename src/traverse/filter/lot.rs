@@ -344,7 +344,7 @@ impl Lot {
             primitives[lane] = traveller.inverse[3].to_bits() as i32;
         }
         let [x, y, z, closest] = L::columns(&starts);
-        (Closest::of_found(closest, L::ids_of(&primitives)), [x, y, z])
+        (Closest::of_found(closest, L::ids_of(&primitives), [L::splat(0.0); 2]), [x, y, z])
     }
 
     /// Rays' directions, or their shears, and `tnear`.

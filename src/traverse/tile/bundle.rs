@@ -22,6 +22,9 @@ pub trait Bundle<L: Sixteen, const K: usize> {
     /// The same of each lane.
     fn reach_of_lanes(&self) -> L;
 
+    /// Takes note of how far packets of a square that were [tested](Self::test) still look. [`reach`](Self::reach) tells it only then.
+    fn settle(&mut self, square: usize);
+
     /// Tests a packet of a square against the triangles whose bits are set in `chosen`, of a block with the ids
     /// `primitives`.
     fn test(&mut self, square: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32);

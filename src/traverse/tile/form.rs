@@ -32,12 +32,21 @@ const NARROWEST: f64 = 1e-12;
 
 /// The slopes of rays from a beam's apex, along the first of the frame's axes and along the second, packet by packet of
 /// each of `K` squares. Those of lanes that do not belong to it may be anything.
+///
+/// They are the directions' own, as tests have them. Where the frame is turned, those that its window has are these turned.
 #[repr(C, align(64))]
-pub struct Slopes<const K: usize>(pub [[[[f32; 16]; PACKETS]; 2]; K]);
+pub struct Slopes<const K: usize>([[[[f32; 16]; PACKETS]; 2]; K]);
 
 impl<const K: usize> Slopes<K> {
     pub const fn new() -> Self {
         Self([[[[0.0; 16]; PACKETS]; 2]; K])
+    }
+
+    /// Those of a packet.
+    #[inline(always)]
+    pub fn of<L: Sixteen>(&self, square: usize, packet: usize) -> [L; 2] {
+        let [first, second] = &self.0[square];
+        [L::load(&first[packet]), L::load(&second[packet])]
     }
 }
 
@@ -159,17 +168,18 @@ fn square_from_apex<L: Sixteen>(
             continue;
         }
         let axis = frame.axes[2];
-        let forward = L::load(&rays.direction[axis]) * L::splat(frame.sign);
+        let along = L::load(&rays.direction[axis]);
+        let forward = along * L::splat(frame.sign);
         let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
         let mut fits = ordinary(forward, tnear, tfar);
         for axis in 0..3 {
             fits = fits & L::load(&rays.origin[axis]).eq(L::splat(frame.apex[axis]));
         }
         let slope = [
-            L::load(&rays.direction[frame.axes[0]]) / forward,
-            L::load(&rays.direction[frame.axes[1]]) / forward,
+            L::load(&rays.direction[frame.axes[0]]) / along,
+            L::load(&rays.direction[frame.axes[1]]) / along,
         ];
-        let lanes = belonging(active[packet], fits.bits(), are_flat(&slope).bits());
+        let lanes = belonging(active[packet], fits.bits(), are_flat(&slope, 1.0).bits());
         active[packet] = lanes;
         if lanes == 0 {
             left_out(misfits, most)?;
@@ -187,7 +197,11 @@ fn square_from_apex<L: Sixteen>(
             (nearest[packet], farthest[packet]) = (f32::INFINITY, f32::NEG_INFINITY);
         }
     }
-    let (low, high) = rectangles::<L>(slopes, active);
+    let (mut low, mut high) = rectangles::<L>(slopes, active);
+    if frame.sign < 0.0 {
+        // Turning the divisor turns the quotient, and changes nothing else.
+        (low, high) = ([zero - high[0], zero - high[1]], [zero - low[0], zero - low[1]]);
+    }
     Some(extent(low, high, L::load(&nearest), L::load(&farthest), 0.0))
 }
 
@@ -225,7 +239,10 @@ pub fn of_form<L: Sixteen>(
         let (tnear, tfar) = (L::load(&rays.tnear), L::load(&rays.tfar));
         let forward = if form == Form::Toward { zero - d[2] } else { d[2] };
         let mut fits = ordinary(forward, tnear, tfar);
-        let slopes = if form == Form::Along { along } else { [d[0] / d[2], d[1] / d[2]] };
+        // One division in place of two: what is told from places allows for more than the rounding that this adds, and lanes
+        // that run about as fast along another axis stay out.
+        let rate = L::splat(1.0) / d[2];
+        let slopes = if form == Form::Along { along } else { [d[0] * rate, d[1] * rate] };
 
         let (start, end) = (o[2] + d[2] * tnear, o[2] + d[2] * tfar);
         let crossing = [o[0] - slopes[0] * o[2], o[1] - slopes[1] * o[2]];
@@ -249,7 +266,9 @@ pub fn of_form<L: Sixteen>(
                 }
             }
         }
-        let lanes = belonging(lanes, fits.bits(), are_flat(&slopes).bits());
+        // Parallel rays run fastest along the frame's axis as they are, or as fast along another one.
+        let flat = if form == Form::Along { lanes } else { are_flat(&slopes, NARROW).bits() };
+        let lanes = belonging(lanes, fits.bits(), flat);
         active[packet] = lanes;
         if lanes == 0 {
             left_out(&mut misfits, MISFITS)?;
@@ -280,10 +299,10 @@ fn belonging(lanes: u32, fits: u32, flat: u32) -> u32 {
     if flat & !fits == 0 { flat } else { 0 }
 }
 
-/// The lanes that run fastest along the axis that slopes are relative to.
+/// The lanes whose slopes are less than `limit`: with one of 1, those that run fastest along the axis that slopes are relative to.
 #[inline(always)]
-fn are_flat<L: Sixteen>(slopes: &[L; 2]) -> L::Mask {
-    slopes[0].abs().lt(L::splat(1.0)) & slopes[1].abs().lt(L::splat(1.0))
+fn are_flat<L: Sixteen>(slopes: &[L; 2], limit: f32) -> L::Mask {
+    slopes[0].abs().lt(L::splat(limit)) & slopes[1].abs().lt(L::splat(limit))
 }
 
 /// One more packet of which nothing belongs. `None` if there are more than `most`.

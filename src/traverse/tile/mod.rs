@@ -44,7 +44,7 @@ use crate::simd::{Mask, Simd, Sixteen};
 use crate::traverse::records::Records;
 use beam::{Beam, Extent, Frame, Spread};
 use form::{Form, Seen, Slopes};
-use nearest::Nearest;
+use nearest::{Nearest, SEEN};
 use page::Descent;
 use shadow::Shadows;
 
@@ -145,11 +145,11 @@ fn nearest<S: Simd, T: Records<M>, M: Mode, P: Probe, const K: usize>(
         miss(&belong, hits);
         return Done { lanes: belong, work: Some(work) };
     }
-    let mut bundle = Nearest::<S, T, M, K>::new(tree, rays, &belong, &beam);
-    bundle.begin(&slopes);
+    let mut bundle = Nearest::<S, T, M, K>::new(tree, rays, &belong, &beam, &slopes);
+    bundle.begin();
     let squares = page::windows(&extents, beam.spread.blur::<false>());
     let work = Descent::new(tree, &beam, &squares, work).walk(&mut bundle, interval, probe);
-    let mut normals = Normals::new();
+    let mut normals = Normals::<SEEN>::new();
     for (square, (hits, belong)) in hits.chunks_mut(PACKETS).zip(&belong).enumerate() {
         for (packet, hits) in hits.iter_mut().enumerate() {
             if belong[packet & 15] != 0 {

@@ -5,7 +5,7 @@ use super::bundle::{Bundle, ROUNDINGS, greatest_of_lanes};
 use super::form::Slopes;
 use super::outline::Block;
 use super::page::bits;
-use crate::geometry::triangle::{Mode, Test};
+use crate::geometry::triangle::{Mode, Test, Weights};
 use crate::simd::{Lanes, Mask, Simd, Sixteen, Task};
 use crate::traverse::closest::{Closest, Normals};
 use crate::traverse::lanes::{HitPacket, RayPacket};
@@ -13,8 +13,44 @@ use crate::traverse::packet::descend;
 use crate::traverse::records::Records;
 use crate::traverse::walk::{Interval, Walk, load3};
 
-/// What the test of a packet keeps for a beam.
+/// So many normals are remembered from packet to packet.
+pub const SEEN: usize = 8;
+
+/// So many packets of a square, or more, are looked at together.
+const FEW_CHANGED: u32 = 4;
+
+/// What the test of a packet keeps for a beam, and of a hit's weights.
 type Kept<M, L> = <<M as Mode>::Test<16, L> as Test<16, L>>::Kept;
+type WeightsOf<M, L> = <<M as Mode>::Test<16, L> as Test<16, L>>::Weights;
+
+/// What a packet's rays have found, in memory.
+struct Found<L: Sixteen, M: Mode> {
+    t: L,
+    primitive: L::Ids,
+    weights: WeightsOf<M, L>,
+}
+
+impl<L: Sixteen, M: Mode> Clone for Found<L, M> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L: Sixteen, M: Mode> Copy for Found<L, M> {}
+
+impl<L: Sixteen, M: Mode> Found<L, M> {
+    #[inline(always)]
+    fn of(closest: &Closest<16, L>) -> Self {
+        let weights = WeightsOf::<M, L>::of(closest.weights());
+        Self { t: closest.t, primitive: closest.ids(), weights }
+    }
+
+    #[inline(always)]
+    fn closest(&self) -> Closest<16, L> {
+        Closest::of_found(self.t, self.primitive, self.weights.get())
+    }
+}
 
 /// Up to `K` squares of sixteen packets.
 ///
@@ -27,11 +63,14 @@ pub struct Nearest<'a, S: Simd, T, M: Mode, const K: usize> {
     /// Which lanes of each packet count.
     active: &'a [[u32; PACKETS]; K],
     beam: &'a Beam<S::F16, false>,
+    slopes: &'a Slopes<K>,
     kept: [[Kept<M, S::F16>; PACKETS]; K],
-    closest: [[Closest<16, S::F16>; PACKETS]; K],
+    found: [[Found<S::F16, M>; PACKETS]; K],
     /// The depth beyond which no ray of a packet looks for anything any more. In a register: a lane that is stored
     /// by itself and loaded with the others at once waits for the memory.
     reach: [S::F16; K],
+    /// The packets whose rays have found something since the reach of their square was settled.
+    changed: u32,
 }
 
 impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K> {
@@ -42,37 +81,35 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K
         rays: &'a [RayPacket<16>],
         active: &'a [[u32; PACKETS]; K],
         beam: &'a Beam<S::F16, false>,
+        slopes: &'a Slopes<K>,
     ) -> Self {
         Self {
             tree,
             rays,
             active,
             beam,
+            slopes,
             kept: [[Default::default(); PACKETS]; K],
-            closest: [[Closest::new(S::F16::splat(f32::NEG_INFINITY)); PACKETS]; K],
+            found: [[Found::of(&Closest::new(S::F16::splat(f32::NEG_INFINITY))); PACKETS]; K],
             reach: [S::F16::splat(f32::INFINITY); K],
+            changed: 0,
         }
     }
 
-    /// Puts the rays at their start; `slopes` are those of the beam's rays. Not a part of [`new`](Self::new): what is made by
-    /// many steps may be copied when it is given, and this is large.
+    /// Puts the rays at their start. Not a part of [`new`](Self::new): what is made by many steps may be copied when it is
+    /// given, and this is large.
     #[inline(always)]
-    pub fn begin(&mut self, slopes: &Slopes<K>) {
-        let Frame { axes, sign, .. } = self.beam.frame;
+    pub fn begin(&mut self) {
+        let axis = self.beam.frame.axes[2];
         for square in 0..K {
             let packets = self.rays.len().saturating_sub(square * PACKETS).min(PACKETS);
-            let [first, second] = &slopes.0[square];
             for packet in 0..packets {
                 let rays = &self.rays[square * PACKETS + packet];
-                // Relative to the depth: turning the divisor turns the quotient, and changes nothing else.
-                let turn = S::F16::splat(sign);
-                let slopes = [S::F16::load(&first[packet]) * turn, S::F16::load(&second[packet]) * turn];
-                let along = S::F16::load(&rays.direction[axes[2]]);
-                self.kept[square][packet] = M::Test::<16, S::F16>::keep(slopes, along);
+                self.kept[square][packet] = M::Test::<16, S::F16>::keep(S::F16::load(&rays.direction[axis]));
                 // Lanes that do not count have found what they look for.
                 let nowhere = S::F16::splat(f32::NEG_INFINITY);
                 let tfar = S::F16::select(self.counts(square, packet), S::F16::load(&rays.tfar), nowhere);
-                self.closest[square][packet] = Closest::new(tfar);
+                self.found[square][packet] = Found::of(&Closest::new(tfar));
             }
         }
     }
@@ -87,30 +124,42 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K
     #[inline(always)]
     fn test_of(&self, square: usize, packet: usize) -> M::Test<16, S::F16> {
         let rays = &self.rays[square * PACKETS + packet];
-        revive::<S::F16, M>(&self.beam.frame, rays, &self.kept[square][packet])
+        let slopes = self.slopes.of(square, packet);
+        revive::<S::F16, M>(&self.beam.frame, rays, slopes, &self.kept[square][packet])
     }
 
     /// Writes the hits of a packet's lanes that count. `normals` knows what it was asked for the packet before.
     #[inline(always)]
-    pub fn give(&self, square: usize, packet: usize, normals: &mut Normals, hits: &mut HitPacket<16>) {
+    pub fn give(&self, square: usize, packet: usize, normals: &mut Normals<SEEN>, hits: &mut HitPacket<16>) {
         let test = self.test_of(square, packet);
-        let again = if M::Test::<16, S::F16>::DEFERS { Some(&test) } else { None };
-        let found = self.closest[square][packet].records::<T, M>(self.tree, again, normals);
+        let again = if WeightsOf::<M, S::F16>::ARE_KEPT { None } else { Some(&test) };
+        let closest = self.found[square][packet].closest();
+        let found = closest.records::<T, M, SEEN>(self.tree, again, normals);
         hits.set_part(0, &found, self.active[square][packet]);
     }
 
-    /// Draws a packet's reach in to what its rays still look for: those that count. What the others' speed is may be 0 or
-    /// no number, and no number is the greatest of any.
+    /// The depths to which a packet's rays still look: those that count. What the others' speed is may be 0 or no number, and no
+    /// number is the greatest of any.
+    #[inline(always)]
+    fn depths(&self, square: usize, packet: usize) -> S::F16 {
+        let rays = &self.rays[square * PACKETS + packet];
+        let speed = S::F16::load(&rays.direction[self.beam.frame.axes[2]]).abs();
+        let nowhere = S::F16::splat(f32::NEG_INFINITY);
+        S::F16::select(self.counts(square, packet), self.found[square][packet].t * speed, nowhere)
+    }
+
+    /// Draws the reach of packets of a square in, as far as their bits are set, to what is given for each.
+    #[inline(always)]
+    fn draw_in(&mut self, square: usize, packets: u32, reach: S::F16) {
+        let reach = reach + reach.abs() * S::F16::splat(ROUNDINGS);
+        self.reach[square] = S::F16::select(S::F16::mask_from_bits(packets), reach, self.reach[square]);
+    }
+
+    /// Draws a packet's reach in to what its rays still look for.
     #[inline(always)]
     fn shorten(&mut self, square: usize, packet: usize) {
-        let rays = &self.rays[square * PACKETS + packet];
-        let depths =
-            self.closest[square][packet].t * S::F16::load(&rays.direction[self.beam.frame.axes[2]]).abs();
-        let nowhere = S::F16::splat(f32::NEG_INFINITY);
-        let reach = S::F16::select(self.counts(square, packet), depths, nowhere).greatest();
-        let reach = S::F16::splat(reach + reach.abs() * ROUNDINGS);
-        let this = S::F16::mask_from_bits(1 << packet);
-        self.reach[square] = S::F16::select(this, reach, self.reach[square]);
+        let reach = S::F16::splat(self.depths(square, packet).greatest());
+        self.draw_in(square, 1 << packet, reach);
     }
 }
 
@@ -144,24 +193,39 @@ impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Near
         ];
         let (tnear, live) = (S::F16::load(&rays.tnear), self.counts(square, packet));
         // Out of memory and back: from triangle to triangle it stays in registers.
-        let mut closest = self.closest[square][packet];
-        let kept = &self.kept[square][packet];
+        let mut closest = self.found[square][packet].closest();
+        let (kept, slopes) = (&self.kept[square][packet], self.slopes.of(square, packet));
         for triangle in bits(chosen) {
             let primitive = primitives[triangle];
             // No `unwrap_or_else`: its closure might stay out of line, and be compiled without the
             // instruction set.
-            let told = M::Test::<16, S::F16>::test_placed(kept, &direction, &block.placed, triangle, live);
+            let told =
+                M::Test::<16, S::F16>::test_placed(kept, slopes, &direction, &block.placed, triangle, live);
             let candidate = match told {
                 Some(candidate) => candidate,
                 None => self.test_of(square, packet).test(self.tree.record_of(primitive), live),
             };
-            let weights = !M::Test::<16, S::F16>::DEFERS;
+            let weights = WeightsOf::<M, S::F16>::ARE_KEPT;
             changed |= closest.take::<false>(&candidate, primitive, tnear, live, weights);
         }
-        self.closest[square][packet] = closest;
-        if changed {
-            self.shorten(square, packet);
+        self.found[square][packet] = Found::of(&closest);
+        self.changed |= u32::from(changed) << packet;
+    }
+
+    #[inline(always)]
+    fn settle(&mut self, square: usize) {
+        let changed = std::mem::take(&mut self.changed);
+        if changed.count_ones() < FEW_CHANGED {
+            for packet in bits(changed) {
+                self.shorten(square, packet & 15);
+            }
+            return;
         }
+        let mut depths = [S::F16::splat(f32::NEG_INFINITY); PACKETS];
+        for packet in bits(changed) {
+            depths[packet & 15] = self.depths(square, packet & 15);
+        }
+        self.draw_in(square, changed, S::F16::greatest_of_each(&depths));
     }
 
     #[inline(always)]
@@ -175,8 +239,9 @@ impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Near
             frame: self.beam.frame,
             rays: &self.rays[square * PACKETS + packet],
             active: self.active[square][packet],
+            slopes: self.slopes.of(square, packet),
             kept: &self.kept[square][packet],
-            closest: &mut self.closest[square][packet],
+            found: &mut self.found[square][packet],
             place,
             depths: Interval { tmin, tmax },
         };
@@ -188,8 +253,13 @@ impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Near
 
 /// The test of a packet of which that was kept.
 #[inline(always)]
-fn revive<L: Sixteen, M: Mode>(frame: &Frame, rays: &RayPacket<16>, kept: &Kept<M, L>) -> M::Test<16, L> {
-    M::Test::<16, L>::revive(kept, &frame.apex, &load3(&rays.direction), frame.axes[2])
+fn revive<L: Sixteen, M: Mode>(
+    frame: &Frame,
+    rays: &RayPacket<16>,
+    slopes: [L; 2],
+    kept: &Kept<M, L>,
+) -> M::Test<16, L> {
+    M::Test::<16, L>::revive(kept, slopes, &frame.apex, &load3(&rays.direction), frame.axes[2])
 }
 
 /// A packet that goes on alone, as a beam has it.
@@ -199,8 +269,9 @@ struct Alone<'a, L: Sixteen, T, M: Mode> {
     rays: &'a RayPacket<16>,
     /// Which of its lanes count.
     active: u32,
+    slopes: [L; 2],
     kept: &'a Kept<M, L>,
-    closest: &'a mut Closest<16, L>,
+    found: &'a mut Found<L, M>,
     /// The place of the upper tree below which it goes on.
     place: usize,
     /// From which depth it does, and to which.
@@ -213,21 +284,22 @@ impl<L: Sixteen, T: Records<M>, M: Mode> Task for Alone<'_, L, T, M> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { tree, frame, rays, active, kept, closest, place, depths: Interval { tmin, tmax } } = self;
+        let Self { tree, frame, rays, active, slopes, kept, found, place, depths } = self;
+        let Interval { tmin, tmax } = depths;
         let (walk, inside) = Walk::<16, L>::new(rays, active, tree.bounds());
         let speed = L::load(&rays.direction[frame.axes[2]]).abs();
-        let mut found = *closest;
+        let mut closest = found.closest();
         let interval = Interval {
             tmin: (L::splat(tmin - tmin.abs() * ROUNDINGS) / speed).max(inside.tmin),
-            tmax: (L::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(found.t),
+            tmax: (L::splat(tmax + tmax.abs() * ROUNDINGS) / speed).min(inside.tmax).min(closest.t),
         };
         if !interval.live().any() {
             return false;
         }
-        let test = revive::<L, M>(&frame, rays, kept);
+        let test = revive::<L, M>(&frame, rays, slopes, kept);
         let (tnear, node) = (L::load(&rays.tnear), tree.beneath(place));
-        descend::<16, L, T, M, false>(tree, &walk, &test, tnear, node, interval, &mut found);
-        *closest = found;
+        descend::<16, L, T, M, false>(tree, &walk, &test, tnear, node, interval, &mut closest);
+        *found = Found::of(&closest);
         true
     }
 }

@@ -276,29 +276,32 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
         // Cull for packets, the rarer of packets and triangles one by one.
         self.work += triangles.count_ones().min(live.count_ones()) * CULL_WORK;
         let mut chosen = [0; PACKETS];
+        let mut some = 0;
         if triangles.count_ones() <= live.count_ones() {
+            let (lanes, mut of_lanes) = (L::mask_from_bits(live), L::ids(0));
             for triangle in bits(triangles) {
-                let outline = self.block.one::<L, PARALLEL>(triangle);
-                for packet in bits(outline.meets(window).bits() & live) {
-                    chosen[packet & 15] |= 1 << triangle;
-                }
+                let meets = self.block.one::<L, PARALLEL>(triangle).meets(window) & lanes;
+                of_lanes = L::ids_with(meets, of_lanes, 1 << triangle);
             }
+            some = L::ids_less(L::ids(0), of_lanes).bits();
+            chosen = L::ids_store(of_lanes);
         } else {
             let rows = window.rows();
             for packet in bits(live) {
-                chosen[packet & 15] = outline.meets(&rows.one(packet)).bits() & triangles;
+                let meets = outline.meets(&rows.one(packet)).bits() & triangles;
+                chosen[packet & 15] = meets as i32;
+                some |= u32::from(meets != 0) << packet;
             }
         }
 
         // Test what is left.
-        for packet in bits(live) {
-            let chosen = chosen[packet & 15];
-            if chosen != 0 {
-                self.work += chosen.count_ones() * TEST_WORK;
-                probe.tests(chosen.count_ones());
-                bundle.test(square, packet, &self.block, primitives, chosen);
-            }
+        for packet in bits(some) {
+            let chosen = chosen[packet & 15] as u32;
+            self.work += chosen.count_ones() * TEST_WORK;
+            probe.tests(chosen.count_ones());
+            bundle.test(square, packet, &self.block, primitives, chosen);
         }
+        bundle.settle(square);
     }
 }
 

@@ -20,7 +20,7 @@ use crate::traverse::walk::{Interval, Walk, load3};
 use std::marker::PhantomData;
 
 /// A square's packets, whose rays stand in sixteen lanes each.
-pub struct Shadows<'a, S, T, M, const PARALLEL: bool> {
+pub struct Shadows<'a, S: Simd, T, M, const PARALLEL: bool> {
     tree: &'a T,
     rays: &'a [RayPacket<16>],
     /// The axis along which all rays run fastest.
@@ -28,8 +28,10 @@ pub struct Shadows<'a, S, T, M, const PARALLEL: bool> {
     seen: &'a Seen,
     /// The lanes of each packet that have found nothing yet.
     pub open: [u32; PACKETS],
-    /// The depth beyond which no ray of a packet looks for anything any more.
-    reach: [f32; PACKETS],
+    /// The depth beyond which no ray of a packet looks for anything.
+    reach: S::F16,
+    /// The packets of which no ray looks for anything any more.
+    closed: u32,
     types: PhantomData<(S, M)>,
 }
 
@@ -44,14 +46,14 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Shadows<'a, S, T
         seen: &'a mut Seen,
         interval: &Interval<S::F16>,
     ) -> Self {
-        let reach = interval.tmax.store();
+        let ends = interval.tmax.store();
         for packet in 0..rays.len().min(PACKETS) {
             // A depth is multiplied by what may be off by a rounding of 1: it must be no farther than the
             // scene is.
             let far = &mut seen.far[packet];
-            *far = S::F16::load(far).min(S::F16::splat(reach[packet])).store();
+            *far = S::F16::load(far).min(S::F16::splat(ends[packet])).store();
         }
-        Self { tree, rays, axis, seen, open: *active, reach, types: PhantomData }
+        Self { tree, rays, axis, seen, open: *active, reach: interval.tmax, closed: 0, types: PhantomData }
     }
 
     /// The mode's own test, of the lanes in `doubtful` that do not leave the triangle behind.
@@ -81,9 +83,7 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Shadows<'a, S, T
     #[inline(always)]
     fn close(&mut self, packet: usize, found: u32) {
         self.open[packet] &= !found;
-        if self.open[packet] == 0 {
-            self.reach[packet] = f32::NEG_INFINITY;
-        }
+        self.closed |= u32::from(self.open[packet] == 0) << packet;
     }
 }
 
@@ -99,13 +99,17 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
 
     #[inline(always)]
     fn reach(&self, _: usize) -> S::F16 {
-        S::F16::load(&self.reach)
+        let closed = S::F16::mask_from_bits(self.closed);
+        S::F16::select(closed, S::F16::splat(f32::NEG_INFINITY), self.reach)
     }
 
     #[inline(always)]
     fn reach_of_lanes(&self) -> S::F16 {
-        S::F16::load(&self.reach)
+        self.reach(0)
     }
+
+    #[inline(always)]
+    fn settle(&mut self, _: usize) {}
 
     #[inline(always)]
     fn test(&mut self, _: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
@@ -114,10 +118,12 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
         if lanes == 0 {
             return;
         }
-        let mut open = S::F16::mask_from_bits(lanes);
+        let open = S::F16::mask_from_bits(lanes);
         let [a, b] = &self.seen.place;
         let (a, b) = (S::F16::load(&a[packet]), S::F16::load(&b[packet]));
         let (near, far) = (S::F16::load(&self.seen.near[packet]), S::F16::load(&self.seen.far[packet]));
+        let mut found = S::F16::mask_from_bits(0);
+        let mut doubts = Doubts::none();
         for triangle in bits(chosen) {
             // On which sides of the edges the rays pass.
             let (mut least, mut greatest) = (S::F16::splat(f32::INFINITY), S::F16::splat(f32::NEG_INFINITY));
@@ -128,10 +134,7 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
             }
             let slack = block.slack_of(triangle);
             let (above, below) = (S::F16::splat(slack), S::F16::splat(-slack));
-            let maybe_inside = open & !(least.lt(below) & above.lt(greatest));
-            if !maybe_inside.any() {
-                continue;
-            }
+            let outside = least.lt(below) & above.lt(greatest);
 
             // Whether the plane lies between the rays' ends.
             let [x, y, z, other, slack] = block.plane_of(triangle);
@@ -142,26 +145,25 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
             } else {
                 (near * linear, far * linear, other)
             };
-            let maybe = maybe_inside & !(at_far.lt(plane - slack)) & !((plane + slack).lt(at_near));
-            if !maybe.any() {
-                continue;
-            }
-            let mut found = maybe & !maybe;
+            let (nearest, farthest) = (plane - slack, plane + slack);
+            let maybe = open & !(outside | at_far.lt(nearest) | farthest.lt(at_near));
             if M::SURE {
                 let inside = above.lt(least) | greatest.lt(below);
-                let between = (plane + slack).lt(at_far) & at_near.lt(plane - slack);
-                found = maybe & inside & between;
+                let between = farthest.lt(at_far) & at_near.lt(nearest);
+                found = found | (maybe & inside & between);
             }
-            let doubtful = maybe & !found;
-            if doubtful.any() {
-                found = found | self.decide(packet, primitives[triangle], doubtful);
-            }
-            open = open & !found;
-            if !open.any() {
+            doubts.note(triangle, (maybe & !found).bits());
+            if !(open & !found).any() {
                 break;
             }
         }
-        self.close(packet, lanes & !open.bits());
+        for (triangle, doubtful) in doubts.noted() {
+            let doubtful = S::F16::mask_from_bits(doubtful) & !found;
+            if doubtful.any() {
+                found = found | self.decide(packet, primitives[triangle], doubtful);
+            }
+        }
+        self.close(packet, found.bits());
     }
 
     #[inline(always)]
@@ -180,6 +182,37 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
             mode: PhantomData,
         });
         self.close(packet, found);
+    }
+}
+
+/// What is in doubt of a packet's rays, triangle by triangle, until all of them have been looked at: many a ray turns out to
+/// hit something else for certain by then. And whether a triangle leaves any doubt is what nobody can foresee: so nothing
+/// branches on it before.
+struct Doubts {
+    triangles: [u8; 16],
+    /// A bit for each ray that is in doubt.
+    lanes: [u32; 16],
+    count: usize,
+}
+
+impl Doubts {
+    #[inline(always)]
+    const fn none() -> Self {
+        Self { triangles: [0; 16], lanes: [0; 16], count: 0 }
+    }
+
+    /// Takes note of one of a block's triangles, none of which comes twice, if there are rays in doubt.
+    #[inline(always)]
+    fn note(&mut self, triangle: usize, lanes: u32) {
+        let place = self.count & 15;
+        (self.triangles[place], self.lanes[place]) = (triangle as u8, lanes);
+        self.count += usize::from(lanes != 0);
+    }
+
+    /// What was noted.
+    #[inline(always)]
+    fn noted(&self) -> impl Iterator<Item = (usize, u32)> {
+        (0..self.count).map(|place| (usize::from(self.triangles[place & 15]), self.lanes[place & 15]))
     }
 }
 

@@ -26,16 +26,23 @@ pub struct Filter<const W: usize, L: Lanes<W>> {
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Filter<W, L> {
     type Record = Triangle;
     type Kept = <Shear<W, L> as Test<W, L>>::Kept;
+    type Weights = [L; 2];
 
     #[inline(always)]
-    fn keep(slopes: [L; 2], along: L) -> Self::Kept {
-        Shear::keep(slopes, along)
+    fn keep(along: L) -> Self::Kept {
+        Shear::keep(along)
     }
 
     #[inline(always)]
-    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self {
+    fn revive(
+        kept: &Self::Kept,
+        slopes: [L; 2],
+        apex: &[f32; 3],
+        direction: &Lanes3<L>,
+        axis: usize,
+    ) -> Self {
         Self {
-            shear: Shear::revive(kept, apex, direction, axis),
+            shear: Shear::revive(kept, slopes, apex, direction, axis),
             origin: apex.map(|coordinate| [coordinate; W]),
             direction: [direction[0].store(), direction[1].store(), direction[2].store()],
         }

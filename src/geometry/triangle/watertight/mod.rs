@@ -114,30 +114,36 @@ fn likely<const W: usize, L: Lanes<W>>(
     !(a.min(b).min(c).lt(L::splat(0.0) - error) & error.lt(a.max(b).max(c)))
 }
 
-/// `(dx/dz, dy/dz, 1/dz)` in renamed coordinates, kept.
+/// `1/dz` in renamed coordinates, kept.
 #[derive(Clone, Copy)]
-pub struct Sheared<const W: usize, L: Lanes<W>>(Lanes3<L>);
+pub struct Scale<const W: usize, L: Lanes<W>>(L);
 
-impl<const W: usize, L: Lanes<W>> Default for Sheared<W, L> {
+impl<const W: usize, L: Lanes<W>> Default for Scale<W, L> {
     #[inline(always)]
     fn default() -> Self {
-        Self([L::splat(0.0); 3])
+        Self(L::splat(0.0))
     }
 }
 
 impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     type Record = Triangle;
-    const DEFERS: bool = true;
-    /// The shear.
-    type Kept = Sheared<W, L>;
+    /// Beside slopes, what is left of the shear.
+    type Kept = Scale<W, L>;
+    type Weights = ();
 
     #[inline(always)]
-    fn keep([x, y]: [L; 2], along: L) -> Self::Kept {
-        Sheared([x, y, L::splat(1.0) / along])
+    fn keep(along: L) -> Self::Kept {
+        Scale(L::splat(1.0) / along)
     }
 
     #[inline(always)]
-    fn revive(kept: &Self::Kept, apex: &[f32; 3], direction: &Lanes3<L>, axis: usize) -> Self {
+    fn revive(
+        kept: &Self::Kept,
+        [x, y]: [L; 2],
+        apex: &[f32; 3],
+        direction: &Lanes3<L>,
+        axis: usize,
+    ) -> Self {
         let [i, j, k] = RENAMED[axis];
         // With one axis for all, nobody asks which lanes have it.
         let nobody = L::mask_from_bits(0);
@@ -147,7 +153,7 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
             major_y: nobody,
             origin: [L::splat(apex[i]), L::splat(apex[j]), L::splat(apex[k])],
             direction: [direction[i], direction[j], direction[k]],
-            shear: kept.0,
+            shear: [x, y, kept.0],
         }
     }
 
@@ -203,12 +209,13 @@ impl<const W: usize, L: Lanes<W>> Test<W, L> for Shear<W, L> {
     #[inline(always)]
     fn test_placed(
         kept: &Self::Kept,
+        [x, y]: [L; 2],
         direction: &Lanes3<L>,
         placed: &Placed,
         which: usize,
         lanes: L::Mask,
     ) -> Option<Candidate<W, L>> {
-        placed::test_beam(&kept.0, direction, placed, which, lanes)
+        placed::test_beam(&[x, y, kept.0], direction, placed, which, lanes)
     }
 }
 

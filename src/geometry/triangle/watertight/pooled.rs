@@ -145,8 +145,9 @@ impl Pooled {
     pub fn test<M: Mode>(&self, ray: &Ray) -> M::Alone {
         let axis = usize::from(self.axes[2]) % 3;
         let direction = ray.direction.to_array();
-        let kept = M::Alone::keep([self.shear[0], self.shear[1]], direction[axis]);
-        M::Alone::revive(&kept, &ray.origin.to_array(), &direction, axis)
+        let [x, y, _] = self.shear;
+        let kept = M::Alone::keep(direction[axis]);
+        M::Alone::revive(&kept, [x, y], &ray.origin.to_array(), &direction, axis)
     }
 
     /// Which of the coordinates `x`, `y` and `z` take the places of those.
