@@ -2,6 +2,7 @@
 
 use super::beam::PACKETS;
 use super::outline::Block;
+use super::pairs::Pairs;
 use crate::simd::Sixteen;
 
 /// The rays of a beam of `K` squares, and what they have found.
@@ -22,12 +23,8 @@ pub trait Bundle<L: Sixteen, const K: usize> {
     /// The same of each lane.
     fn reach_of_lanes(&self) -> L;
 
-    /// Takes note of how far packets of a square that were [tested](Self::test) still look. [`reach`](Self::reach) tells it only then.
-    fn settle(&mut self, square: usize);
-
-    /// Tests a packet of a square against the triangles whose bits are set in `chosen`, of a block with the ids
-    /// `primitives`.
-    fn test(&mut self, square: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32);
+    /// Tests packets of a square against triangles of a block with the ids `primitives`, pair by pair.
+    fn test(&mut self, square: usize, pairs: &Pairs, block: &Block, primitives: &[u32]);
 
     /// A packet of a square walks on by itself, through the full tree below a place of the upper one, from the depth
     /// `tmin` to `tmax`.

@@ -114,21 +114,27 @@ pub fn guess<const K: usize>(rays: &[RayPacket<16>], active: &[[u32; PACKETS]; K
 fn meeting(rays: &[RayPacket<16>], active: &[u32], first: usize) -> Option<[f32; 3]> {
     let double = |v: [f32; 3]| glam::DVec3::from_array(v.map(f64::from));
     let lane = first_lane(active, first)?;
-    let (o, d) = (double(origin(&rays[first], lane)), double(direction(&rays[first], lane)));
-    let (mut widest, mut found) = (NARROWEST, None);
+    let d = double(direction(&rays[first], lane));
+
+    // The one that parts most, by the squared sine of the angle, a quotient, times the first direction's squared length.
+    let (mut widest, mut square, mut place) = (0.0, 1.0, None);
     for packet in first + 1..rays.len() {
         let Some(lane) = first_lane(active, packet) else { continue };
-        let (p, e) = (double(origin(&rays[packet], lane)), double(direction(&rays[packet], lane)));
-        let (dd, de, ee) = (d.dot(d), d.dot(e), e.dot(e));
-        let determinant = dd * ee - de * de;
-        if determinant > widest * dd * ee {
-            widest = determinant / (dd * ee);
-            let way = p - o;
-            let t = (ee * way.dot(d) - de * way.dot(e)) / determinant;
-            found = (t > 0.0).then(|| (o + d * t).as_vec3().to_array());
+        let e = double(direction(&rays[packet], lane));
+        let (area, ee) = (d.cross(e).length_squared(), e.length_squared());
+        if area * square > widest * ee {
+            (widest, square, place) = (area, ee, Some((packet, lane)));
         }
     }
-    found
+    let (packet, other) = place?;
+    let (o, p) = (double(origin(&rays[first], lane)), double(origin(&rays[packet], other)));
+    let (e, dd) = (double(direction(&rays[packet], other)), d.length_squared());
+    if widest <= NARROWEST * dd * square {
+        return None;
+    }
+    let way = p - o;
+    let t = (square * way.dot(d) - d.dot(e) * way.dot(e)) / widest;
+    (t > 0.0).then(|| (o + d * t).as_vec3().to_array())
 }
 
 /// The packets' extents, square by square, and their rays' slopes, if the rays are a beam from its apex. What does not belong to

@@ -11,7 +11,7 @@
 //! 2. `page`: the beam descends the *upper tree*, whose leaves are pages of some fifty triangles, near
 //!    cells first.
 //! 3. `outline`: of a page's triangles, sixteen at a time, those that no ray can hit are culled: first
-//!    for the whole beam, then for single packets.
+//!    for the whole beam, then for single packets. What is left is a list of `pairs`.
 //! 4. `nearest`: what is left is tested by the mode's own test, sixteen rays against one triangle, as
 //!    the packet kernel does, and so with the same answers to the bit. `shadow`, for any hit: only where
 //!    an error bound leaves doubt.
@@ -30,6 +30,7 @@ mod form;
 mod nearest;
 mod outline;
 mod page;
+mod pairs;
 mod probe;
 mod shadow;
 

@@ -5,6 +5,7 @@ use super::bundle::{Bundle, ROUNDINGS, greatest_of_lanes};
 use super::form::Slopes;
 use super::outline::Block;
 use super::page::bits;
+use super::pairs::Pairs;
 use crate::geometry::triangle::{Mode, Test, Weights};
 use crate::simd::{Lanes, Mask, Simd, Sixteen, Task};
 use crate::traverse::closest::{Closest, Normals};
@@ -69,8 +70,6 @@ pub struct Nearest<'a, S: Simd, T, M: Mode, const K: usize> {
     /// The depth beyond which no ray of a packet looks for anything any more. In a register: a lane that is stored
     /// by itself and loaded with the others at once waits for the memory.
     reach: [S::F16; K],
-    /// The packets whose rays have found something since the reach of their square was settled.
-    changed: u32,
 }
 
 impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K> {
@@ -92,7 +91,6 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K
             kept: [[Default::default(); PACKETS]; K],
             found: [[Found::of(&Closest::new(S::F16::splat(f32::NEG_INFINITY))); PACKETS]; K],
             reach: [S::F16::splat(f32::INFINITY); K],
-            changed: 0,
         }
     }
 
@@ -161,6 +159,22 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K
         let reach = S::F16::splat(self.depths(square, packet).greatest());
         self.draw_in(square, 1 << packet, reach);
     }
+
+    /// Draws the reach of packets of a square in that have found something.
+    #[inline(always)]
+    fn settle(&mut self, square: usize, changed: u32) {
+        if changed.count_ones() < FEW_CHANGED {
+            for packet in bits(changed) {
+                self.shorten(square, packet & 15);
+            }
+            return;
+        }
+        let mut depths = [S::F16::splat(f32::NEG_INFINITY); PACKETS];
+        for packet in bits(changed) {
+            depths[packet & 15] = self.depths(square, packet & 15);
+        }
+        self.draw_in(square, changed, S::F16::greatest_of_each(&depths));
+    }
 }
 
 impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Nearest<'_, S, T, M, K> {
@@ -181,21 +195,18 @@ impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Near
     }
 
     #[inline(always)]
-    fn test(&mut self, square: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
-        let packet = packet & 15;
-        let mut changed = false;
+    fn test(&mut self, square: usize, pairs: &Pairs, block: &Block, primitives: &[u32]) {
         let [i, j, k] = self.beam.frame.axes;
-        let rays = &self.rays[square * PACKETS + packet];
-        let direction = [
-            S::F16::load(&rays.direction[i]),
-            S::F16::load(&rays.direction[j]),
-            S::F16::load(&rays.direction[k]),
-        ];
-        let (tnear, live) = (S::F16::load(&rays.tnear), self.counts(square, packet));
-        // Out of memory and back: from triangle to triangle it stays in registers.
-        let mut closest = self.found[square][packet].closest();
-        let (kept, slopes) = (&self.kept[square][packet], self.slopes.of(square, packet));
-        for triangle in bits(chosen) {
+        let mut changed = 0;
+        for (packet, triangle) in pairs.iter() {
+            let rays = &self.rays[square * PACKETS + packet];
+            let direction = [
+                S::F16::load(&rays.direction[i]),
+                S::F16::load(&rays.direction[j]),
+                S::F16::load(&rays.direction[k]),
+            ];
+            let (tnear, live) = (S::F16::load(&rays.tnear), self.counts(square, packet));
+            let (kept, slopes) = (&self.kept[square][packet], self.slopes.of(square, packet));
             let primitive = primitives[triangle];
             // No `unwrap_or_else`: its closure might stay out of line, and be compiled without the
             // instruction set.
@@ -205,27 +216,14 @@ impl<S: Simd, T: Records<M>, M: Mode, const K: usize> Bundle<S::F16, K> for Near
                 Some(candidate) => candidate,
                 None => self.test_of(square, packet).test(self.tree.record_of(primitive), live),
             };
+            let mut closest = self.found[square][packet].closest();
             let weights = WeightsOf::<M, S::F16>::ARE_KEPT;
-            changed |= closest.take::<false>(&candidate, primitive, tnear, live, weights);
-        }
-        self.found[square][packet] = Found::of(&closest);
-        self.changed |= u32::from(changed) << packet;
-    }
-
-    #[inline(always)]
-    fn settle(&mut self, square: usize) {
-        let changed = std::mem::take(&mut self.changed);
-        if changed.count_ones() < FEW_CHANGED {
-            for packet in bits(changed) {
-                self.shorten(square, packet & 15);
+            if closest.take::<false>(&candidate, primitive, tnear, live, weights) {
+                self.found[square][packet] = Found::of(&closest);
+                changed |= 1 << packet;
             }
-            return;
         }
-        let mut depths = [S::F16::splat(f32::NEG_INFINITY); PACKETS];
-        for packet in bits(changed) {
-            depths[packet & 15] = self.depths(square, packet & 15);
-        }
-        self.draw_in(square, changed, S::F16::greatest_of_each(&depths));
+        self.settle(square, changed);
     }
 
     #[inline(always)]

@@ -349,13 +349,6 @@ impl Block {
         side([x, y, z], lane, a, b)
     }
 
-    /// What that may be off by, at most, whichever the edge.
-    #[inline(always)]
-    pub fn slack_of(&self, lane: usize) -> f32 {
-        let lane = lane & 15;
-        self.edges[0][3][lane].max(self.edges[1][3][lane]).max(self.edges[2][3][lane])
-    }
-
     /// The plane of one lane's triangle.
     #[inline(always)]
     pub fn plane_of(&self, lane: usize) -> [f32; 5] {

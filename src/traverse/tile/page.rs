@@ -2,9 +2,10 @@
 //! tested.
 
 use super::FEW;
-use super::beam::{Beam, Extent, PACKETS};
+use super::beam::{Beam, Extent};
 use super::bundle::{Bundle, packet_of, packets_of};
 use super::outline::{Block, Outline, Window};
+use super::pairs::Pairs;
 use super::probe::Probe;
 use crate::kdtree::Tree;
 use crate::simd::{Mask, Sixteen, prefetch_both, stay_a_branch};
@@ -64,6 +65,7 @@ pub struct Descent<'a, L, T, const PARALLEL: bool, const K: usize> {
     /// What each square's packets do. A square alone is what the lanes are.
     squares: &'a [Window<L>; K],
     block: Block,
+    pairs: Pairs,
     /// What was done so far.
     work: u32,
 }
@@ -74,7 +76,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
     pub fn new(tree: &'a T, beam: &'a Beam<L, PARALLEL>, squares: &'a [Window<L>; K], work: u32) -> Self {
         let [never, ever] = [L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY)];
         let lanes = Window::new(beam.low, beam.high, never, ever, beam.spread.blur::<PARALLEL>());
-        Self { tree, beam, lanes, squares, block: Block::new(), work }
+        Self { tree, beam, lanes, squares, block: Block::new(), pairs: Pairs::none(), work }
     }
 
     /// Walks the upper tree with all packets of a tile, in which they are in `interval`. Gives the work that this took beside
@@ -275,33 +277,27 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
 
         // Cull for packets, the rarer of packets and triangles one by one.
         self.work += triangles.count_ones().min(live.count_ones()) * CULL_WORK;
-        let mut chosen = [0; PACKETS];
-        let mut some = 0;
+        self.pairs.clear();
         if triangles.count_ones() <= live.count_ones() {
-            let (lanes, mut of_lanes) = (L::mask_from_bits(live), L::ids(0));
             for triangle in bits(triangles) {
-                let meets = self.block.one::<L, PARALLEL>(triangle).meets(window) & lanes;
-                of_lanes = L::ids_with(meets, of_lanes, 1 << triangle);
+                let packets = self.block.one::<L, PARALLEL>(triangle).meets(window).bits() & live;
+                self.pairs.add_packets::<L>(triangle, packets);
             }
-            some = L::ids_less(L::ids(0), of_lanes).bits();
-            chosen = L::ids_store(of_lanes);
         } else {
             let rows = window.rows();
             for packet in bits(live) {
-                let meets = outline.meets(&rows.one(packet)).bits() & triangles;
-                chosen[packet & 15] = meets as i32;
-                some |= u32::from(meets != 0) << packet;
+                let triangles = outline.meets(&rows.one(packet)).bits() & triangles;
+                self.pairs.add_triangles::<L>(packet, triangles);
             }
         }
 
         // Test what is left.
-        for packet in bits(some) {
-            let chosen = chosen[packet & 15] as u32;
-            self.work += chosen.count_ones() * TEST_WORK;
-            probe.tests(chosen.count_ones());
-            bundle.test(square, packet, &self.block, primitives, chosen);
+        let tests = self.pairs.len() as u32;
+        if tests != 0 {
+            self.work += tests * TEST_WORK;
+            probe.tests(tests);
+            bundle.test(square, &self.pairs, &self.block, primitives);
         }
-        bundle.settle(square);
     }
 }
 

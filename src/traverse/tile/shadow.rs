@@ -9,7 +9,7 @@ use super::beam::PACKETS;
 use super::bundle::{Bundle, ROUNDINGS};
 use super::form::Seen;
 use super::outline::Block;
-use super::page::bits;
+use super::pairs::Pairs;
 use crate::geometry::triangle::{Mode, Test, leave};
 use crate::simd::{Lanes, Mask, Simd, Task};
 use crate::traverse::closest::Closest;
@@ -32,6 +32,7 @@ pub struct Shadows<'a, S: Simd, T, M, const PARALLEL: bool> {
     reach: S::F16,
     /// The packets of which no ray looks for anything any more.
     closed: u32,
+    doubts: Doubts,
     types: PhantomData<(S, M)>,
 }
 
@@ -53,7 +54,17 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Shadows<'a, S, T
             let far = &mut seen.far[packet];
             *far = S::F16::load(far).min(S::F16::splat(ends[packet])).store();
         }
-        Self { tree, rays, axis, seen, open: *active, reach: interval.tmax, closed: 0, types: PhantomData }
+        Self {
+            tree,
+            rays,
+            axis,
+            seen,
+            open: *active,
+            reach: interval.tmax,
+            closed: 0,
+            doubts: Doubts::none(),
+            types: PhantomData,
+        }
     }
 
     /// The mode's own test, of the lanes in `doubtful` that do not leave the triangle behind.
@@ -109,22 +120,17 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
     }
 
     #[inline(always)]
-    fn settle(&mut self, _: usize) {}
+    fn test(&mut self, _: usize, pairs: &Pairs, block: &Block, primitives: &[u32]) {
+        self.doubts.count = 0;
+        for (packet, triangle) in pairs.iter() {
+            let open = self.open[packet];
+            if open == 0 {
+                continue;
+            }
+            let [a, b] = &self.seen.place;
+            let (a, b) = (S::F16::load(&a[packet]), S::F16::load(&b[packet]));
+            let (near, far) = (S::F16::load(&self.seen.near[packet]), S::F16::load(&self.seen.far[packet]));
 
-    #[inline(always)]
-    fn test(&mut self, _: usize, packet: usize, block: &Block, primitives: &[u32], chosen: u32) {
-        let packet = packet & 15;
-        let lanes = self.open[packet];
-        if lanes == 0 {
-            return;
-        }
-        let open = S::F16::mask_from_bits(lanes);
-        let [a, b] = &self.seen.place;
-        let (a, b) = (S::F16::load(&a[packet]), S::F16::load(&b[packet]));
-        let (near, far) = (S::F16::load(&self.seen.near[packet]), S::F16::load(&self.seen.far[packet]));
-        let mut found = S::F16::mask_from_bits(0);
-        let mut doubts = Doubts::none();
-        for triangle in bits(chosen) {
             // On which sides of the edges the rays pass.
             let (mut least, mut greatest) = (S::F16::splat(f32::INFINITY), S::F16::splat(f32::NEG_INFINITY));
             for edge in 0..3 {
@@ -132,7 +138,7 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
                 least = least.min(side);
                 greatest = greatest.max(side);
             }
-            let slack = block.slack_of(triangle);
+            let slack = block.placed.slack[triangle];
             let (above, below) = (S::F16::splat(slack), S::F16::splat(-slack));
             let outside = least.lt(below) & above.lt(greatest);
 
@@ -146,24 +152,27 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
                 (near * linear, far * linear, other)
             };
             let (nearest, farthest) = (plane - slack, plane + slack);
-            let maybe = open & !(outside | at_far.lt(nearest) | farthest.lt(at_near));
+            let never = outside | at_far.lt(nearest) | farthest.lt(at_near);
+            let maybe = open & !never.bits();
+            let mut found = 0;
             if M::SURE {
                 let inside = above.lt(least) | greatest.lt(below);
                 let between = farthest.lt(at_far) & at_near.lt(nearest);
-                found = found | (maybe & inside & between);
+                found = maybe & (inside & between).bits();
             }
-            doubts.note(triangle, (maybe & !found).bits());
-            if !(open & !found).any() {
-                break;
+            self.close(packet, found);
+            self.doubts.note(packet, triangle, maybe & !found);
+        }
+
+        // What is in doubt still.
+        for place in 0..self.doubts.count {
+            let (packet, triangle, lanes) = self.doubts.at(place);
+            let doubtful = lanes & self.open[packet];
+            if doubtful != 0 {
+                let found = self.decide(packet, primitives[triangle], S::F16::mask_from_bits(doubtful));
+                self.close(packet, found.bits());
             }
         }
-        for (triangle, doubtful) in doubts.noted() {
-            let doubtful = S::F16::mask_from_bits(doubtful) & !found;
-            if doubtful.any() {
-                found = found | self.decide(packet, primitives[triangle], doubtful);
-            }
-        }
-        self.close(packet, found.bits());
     }
 
     #[inline(always)]
@@ -185,34 +194,35 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
     }
 }
 
-/// What is in doubt of a packet's rays, triangle by triangle, until all of them have been looked at: many a ray turns out to
-/// hit something else for certain by then. And whether a triangle leaves any doubt is what nobody can foresee: so nothing
-/// branches on it before.
+/// What is in doubt of packets' rays, pair by pair, until all of a block's pairs have been looked at: many a ray turns out to
+/// hit something else for certain by then. And whether there is any doubt is what nobody can foresee: so nothing branches
+/// on it before.
 struct Doubts {
-    triangles: [u8; 16],
+    /// Packets and triangles.
+    pairs: [[u8; 2]; 256],
     /// A bit for each ray that is in doubt.
-    lanes: [u32; 16],
+    lanes: [u32; 256],
     count: usize,
 }
 
 impl Doubts {
-    #[inline(always)]
     const fn none() -> Self {
-        Self { triangles: [0; 16], lanes: [0; 16], count: 0 }
+        Self { pairs: [[0; 2]; 256], lanes: [0; 256], count: 0 }
     }
 
-    /// Takes note of one of a block's triangles, none of which comes twice, if there are rays in doubt.
+    /// Takes note of one of a block's pairs, none of which comes twice, if there are rays in doubt.
     #[inline(always)]
-    fn note(&mut self, triangle: usize, lanes: u32) {
-        let place = self.count & 15;
-        (self.triangles[place], self.lanes[place]) = (triangle as u8, lanes);
+    fn note(&mut self, packet: usize, triangle: usize, lanes: u32) {
+        let place = self.count & 0xff;
+        (self.pairs[place], self.lanes[place]) = ([packet as u8, triangle as u8], lanes);
         self.count += usize::from(lanes != 0);
     }
 
-    /// What was noted.
+    /// A packet, a triangle, and the packet's rays.
     #[inline(always)]
-    fn noted(&self) -> impl Iterator<Item = (usize, u32)> {
-        (0..self.count).map(|place| (usize::from(self.triangles[place & 15]), self.lanes[place & 15]))
+    fn at(&self, place: usize) -> (usize, usize, u32) {
+        let [packet, triangle] = self.pairs[place & 0xff].map(usize::from);
+        (packet & 15, triangle & 15, self.lanes[place & 0xff])
     }
 }
 
