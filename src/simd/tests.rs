@@ -80,7 +80,7 @@ fn check<const W: usize, L: Lanes<W>>() {
         }
         assert_eq!(
             L::ids_store(L::ids_with(!mask, L::ids(6), 3)),
-            std::array::from_fn(|i| 6 | (!pattern >> i & 1) as i32 * 3)
+            std::array::from_fn(|i| if pattern >> i & 1 == 1 { 6 } else { 7 })
         );
 
         // Of an id only the last bits count.

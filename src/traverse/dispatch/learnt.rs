@@ -123,11 +123,16 @@ impl Beams {
         if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams || count < LEAST_RAYS {
             return by_squares::<Q>(squares, accel, lot);
         }
-        let mut trace = |way, lot: Asked<'_, '_, Q::Answer>| {
+        let trace = |way, lot: Asked<'_, '_, Q::Answer>| {
             let start = Stopwatch::start(accel);
             match way {
                 WIDE => lot.trace::<Q>(accel, Kernel::WideTile),
-                _ => by_squares::<Q>(squares, accel, lot),
+                // All as beams, untimed: while lots go wide, little is known of other ways for squares, so that they are tried often,
+                // and a pair would compare wide beams with that.
+                _ => lot.squares().for_each(
+                    #[inline(always)]
+                    |(rays, active, answers)| Q::trace(Kernel::Tile, accel, rays, active, answers),
+                ),
             }
             start.elapsed(accel)
         };
@@ -143,6 +148,7 @@ impl Beams {
                     spent[way] = trace(way, lot.again());
                 }
                 wide.record(spent);
+                squares.pass(cost_of(count, spent[0].min(spent[1])));
             }
         }
     }
