@@ -123,16 +123,11 @@ impl Beams {
         if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams || count < LEAST_RAYS {
             return by_squares::<Q>(squares, accel, lot);
         }
-        let trace = |way, lot: Asked<'_, '_, Q::Answer>| {
+        let mut trace = |way, lot: Asked<'_, '_, Q::Answer>| {
             let start = Stopwatch::start(accel);
             match way {
                 WIDE => lot.trace::<Q>(accel, Kernel::WideTile),
-                // All as beams, untimed: while lots go wide, little is known of other ways for squares, so that they are tried often,
-                // and a pair would compare wide beams with that.
-                _ => lot.squares().for_each(
-                    #[inline(always)]
-                    |(rays, active, answers)| Q::trace(Kernel::Tile, accel, rays, active, answers),
-                ),
+                _ => by_squares::<Q>(squares, accel, lot),
             }
             start.elapsed(accel)
         };
@@ -148,7 +143,6 @@ impl Beams {
                     spent[way] = trace(way, lot.again());
                 }
                 wide.record(spent);
-                squares.pass(cost_of(count, spent[0].min(spent[1])));
             }
         }
     }
