@@ -17,14 +17,14 @@ use crate::traverse::walk::{Interval, Walk, load3};
 /// So many normals are remembered from packet to packet.
 pub const SEEN: usize = 8;
 
-/// So many packets of a square, or more, are looked at together.
+/// Of so many packets of a square, or more, that have found something the reach is drawn in for all at once.
 const FEW_CHANGED: u32 = 4;
 
 /// What the test of a packet keeps for a beam, and of a hit's weights.
 type Kept<M, L> = <<M as Mode>::Test<16, L> as Test<16, L>>::Kept;
 type WeightsOf<M, L> = <<M as Mode>::Test<16, L> as Test<16, L>>::Weights;
 
-/// What a packet's rays have found, in memory.
+/// What a packet's rays have found, in memory: of a [`Closest`] what is not worked out again in the end.
 struct Found<L: Sixteen, M: Mode> {
     t: L,
     primitive: L::Ids,
@@ -126,7 +126,7 @@ impl<'a, S: Simd, T: Records<M>, M: Mode, const K: usize> Nearest<'a, S, T, M, K
         revive::<S::F16, M>(&self.beam.frame, rays, slopes, &self.kept[square][packet])
     }
 
-    /// Writes the hits of a packet's lanes that count. `normals` knows what it was asked for the packet before.
+    /// Writes the hits of a packet's lanes that count. `normals` knows what it was asked for packets before.
     #[inline(always)]
     pub fn give(&self, square: usize, packet: usize, normals: &mut Normals<SEEN>, hits: &mut HitPacket<16>) {
         let test = self.test_of(square, packet);
