@@ -5,7 +5,7 @@
 //! point. Toward the apex they are looked at from its end, so that they too part from it.
 //!
 //! **Frame.** The axis along which the beam's first ray runs fastest becomes z (renamed cyclically, and
-//! turned so that rays leave the apex up along it); all rays must run fastest along it. `z` is the
+//! turned so that rays leave the apex up along it); all rays must run fastest along it (parallel ones: none faster). `z` is the
 //! *depth*, and takes the place of `t` in the walk: it means the same for all rays of the beam, whatever
 //! their origins and their directions' lengths. Two numbers tell a ray from the others, its *place* in
 //! the window that the beam looks through:

@@ -272,7 +272,8 @@ pub fn of_form<L: Sixteen>(
                 }
             }
         }
-        // Parallel rays run fastest along the frame's axis as they are, or as fast along another one.
+        // Parallel rays run fastest along the frame's axis as they are, or as fast along another one; of such axes the frame takes
+        // the one that tests take.
         let flat = if form == Form::Along { lanes } else { are_flat(&slopes, NARROW).bits() };
         let lanes = belonging(lanes, fits.bits(), flat);
         active[packet] = lanes;

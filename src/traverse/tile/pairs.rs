@@ -12,7 +12,7 @@ const TRIANGLES: usize = 16;
 /// Pairs of a packet and a triangle, none of which comes twice.
 pub struct Pairs {
     /// `16 * triangle + packet`. What is closed up into it is written sixteen at a time.
-    list: [i32; PACKETS * TRIANGLES + 16],
+    list: [i32; Self::MOST + 16],
     count: usize,
 }
 
@@ -27,9 +27,12 @@ fn numbers<L: Sixteen, const SHIFT: u32>() -> L::Ids {
 }
 
 impl Pairs {
+    /// So many there are at most.
+    pub const MOST: usize = PACKETS * TRIANGLES;
+
     /// None.
     pub const fn none() -> Self {
-        Self { list: [0; PACKETS * TRIANGLES + 16], count: 0 }
+        Self { list: [0; Self::MOST + 16], count: 0 }
     }
 
     /// Takes all out.
@@ -53,7 +56,7 @@ impl Pairs {
     #[inline(always)]
     fn add<L: Sixteen>(&mut self, numbers: L::Ids, other: i32, bits: u32) {
         let all = <L as Lanes<16>>::mask_from_bits(0xffff);
-        let to = self.list[self.count.min(PACKETS * TRIANGLES)..].first_chunk_mut();
+        let to = self.list[self.count.min(Self::MOST)..].first_chunk_mut();
         L::ids_compact(L::ids_with(all, numbers, other), bits, to.expect("there is room for sixteen more"));
         self.count += bits.count_ones() as usize;
     }
@@ -66,7 +69,7 @@ impl Pairs {
     /// Packets and triangles.
     #[inline(always)]
     pub fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.list[..self.count.min(PACKETS * TRIANGLES)].iter().map(
+        self.list[..self.count.min(Self::MOST)].iter().map(
             #[inline(always)]
             |&pair| (pair as usize & 15, pair as usize >> 4 & 15),
         )

@@ -199,21 +199,21 @@ impl<S: Simd, T: Records<M>, M: Mode, const PARALLEL: bool> Bundle<S::F16, 1>
 /// on it before.
 struct Doubts {
     /// Packets and triangles.
-    pairs: [[u8; 2]; 256],
+    pairs: [[u8; 2]; Pairs::MOST],
     /// A bit for each ray that is in doubt.
-    lanes: [u32; 256],
+    lanes: [u32; Pairs::MOST],
     count: usize,
 }
 
 impl Doubts {
     const fn none() -> Self {
-        Self { pairs: [[0; 2]; 256], lanes: [0; 256], count: 0 }
+        Self { pairs: [[0; 2]; Pairs::MOST], lanes: [0; Pairs::MOST], count: 0 }
     }
 
     /// Takes note of one of a block's pairs, none of which comes twice, if there are rays in doubt.
     #[inline(always)]
     fn note(&mut self, packet: usize, triangle: usize, lanes: u32) {
-        let place = self.count & 0xff;
+        let place = self.count % Pairs::MOST;
         (self.pairs[place], self.lanes[place]) = ([packet as u8, triangle as u8], lanes);
         self.count += usize::from(lanes != 0);
     }
@@ -221,8 +221,9 @@ impl Doubts {
     /// A packet, a triangle, and the packet's rays.
     #[inline(always)]
     fn at(&self, place: usize) -> (usize, usize, u32) {
-        let [packet, triangle] = self.pairs[place & 0xff].map(usize::from);
-        (packet & 15, triangle & 15, self.lanes[place & 0xff])
+        let place = place % Pairs::MOST;
+        let [packet, triangle] = self.pairs[place].map(usize::from);
+        (packet & 15, triangle & 15, self.lanes[place])
     }
 }
 
