@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 /// Subtrees that wait for their turn. Left uninitialised: clearing 8 KB would cost more than a short
 /// walk.
 pub struct Stack<T> {
-    entries: [MaybeUninit<T>; MAX_DEPTH],
+    entries: [MaybeUninit<T>; MAX_DEPTH + 1],
     len: usize,
 }
 
@@ -14,14 +14,20 @@ impl<T: Copy> Stack<T> {
     /// An empty stack.
     #[inline(always)]
     pub fn new() -> Self {
-        Self { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH], len: 0 }
+        Self { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH + 1], len: 0 }
     }
 
-    /// Panics beyond `MAX_DEPTH` entries: a walk waits at most once a level.
+    /// Panics beyond `MAX_DEPTH + 1` entries: a walk waits at most once a level, and for where it is.
     #[inline(always)]
     pub fn push(&mut self, waiting: T) {
         self.entries[self.len].write(waiting);
         self.len += 1;
+    }
+
+    /// Drops the entry that was pushed last.
+    #[inline(always)]
+    pub fn drop_last(&mut self) {
+        self.len = self.len.saturating_sub(1);
     }
 
     /// The entry that was pushed last.

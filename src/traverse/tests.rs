@@ -3,6 +3,7 @@
 use super::*;
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::kdtree::BuildParams;
+use crate::mesh::generate::shapes;
 use crate::mesh::{Colors, Mesh};
 use crate::simd::Isa;
 use glam::Vec3;
@@ -202,6 +203,47 @@ fn powers_of_two_change_nothing_but_exponents() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Many small triangles with room between them, and a tile of rays toward a point behind them: so many triangles lie between
+/// one ray and the next that no beam pays.
+fn through_a_cloud() -> (Accel, [RayPacket<16>; 16]) {
+    let mut mesh = shapes::soup(60_000, 5);
+    for corners in &mesh.triangles {
+        let center = corners.map(|i| mesh.positions[i as usize]).into_iter().sum::<Vec3>() / 3.0;
+        for i in corners {
+            mesh.positions[*i as usize] = center + (mesh.positions[*i as usize] - center) * 0.3;
+        }
+    }
+    let light = Vec3::new(0.5, 0.5, 1.5);
+    let packet = |packet: usize| {
+        let ray = |lane: usize| {
+            let (x, y) = (packet % 4 * 4 + lane % 4, packet / 4 * 4 + lane / 4);
+            let origin = Vec3::new(0.35 + x as f32 * 0.02, 0.35 + y as f32 * 0.02, -0.5);
+            Ray::segment(origin, light - origin, 0.0, 1.0)
+        };
+        RayPacket::of_slice(&std::array::from_fn::<_, 16, _>(ray))
+    };
+    (Accel::build(&mesh, &BuildParams::default()).expect("builds"), std::array::from_fn(packet))
+}
+
+#[test]
+fn a_tile_that_is_given_up_answers_for_every_ray() {
+    let (accel, rays) = through_a_cloud();
+    let mut counts = TileCounts::default();
+    accel.count_tile(&rays, &[0xffff; 16], true, &mut counts);
+    assert!(counts.beams == 1 && counts.alone >= 16, "{counts:?}");
+    for isa in Isa::available() {
+        for accuracy in Accuracy::ALL {
+            let accel = accel.clone().with_isa(isa).with_accuracy(accuracy);
+            let (mut found, mut alone) = ([0; 16], [0; 16]);
+            accel.occluded_tile(&rays, &[0xffff; 16], &mut found);
+            accel.occluded_packets(&rays, &[0xffff; 16], &mut alone);
+            assert_eq!(found, alone, "{accuracy} on {isa}");
+            let hit: u32 = found.iter().map(|lanes| lanes.count_ones()).sum();
+            assert!((32..224).contains(&hit), "{hit} of 256 rays hit anything");
         }
     }
 }

@@ -13,6 +13,10 @@ pub trait Bundle<L: Sixteen, const K: usize> {
     /// triangle in a packet's window.
     const PATIENCE: u32;
 
+    /// Whether packets of a tile that is given up go on alone through what is left of the tree, subtree by subtree; or else from
+    /// the root, but no farther than what they have found.
+    const TAKES_UP_THE_REST: bool;
+
     /// Packets with a wider window go on alone from the start: a square of a picture may lie across an edge, so that
     /// a light sees it as two places far apart.
     const WIDEST: f32;

@@ -16,8 +16,8 @@
 //!    the packet kernel does, and so with the same answers to the bit. `shadow`, for any hit: only where
 //!    an error bound leaves doubt.
 //! 5. Where no more than [`FEW`] packets of the beam are left at a node, each goes on alone as a
-//!    packet through the full tree below; and so does every packet, from the start, of a tile that has
-//!    taken so much work that its rays cannot be alike.
+//!    packet through the full tree below; and so does every packet of a tile that has taken so much work that its rays
+//!    cannot be alike.
 //!
 //! **Wide beams** hold four *squares* of sixteen packets, and a lane stands for four packets that follow one another.
 //! The walk, bringing triangles into lanes and culling for the whole beam are shared by four times as many rays; from
