@@ -24,12 +24,6 @@ impl<T: Copy> Stack<T> {
         self.len += 1;
     }
 
-    /// Drops the entry that was pushed last.
-    #[inline(always)]
-    pub fn drop_last(&mut self) {
-        self.len = self.len.saturating_sub(1);
-    }
-
     /// The entry that was pushed last.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {

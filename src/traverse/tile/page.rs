@@ -132,7 +132,7 @@ impl<'a, L: Sixteen, T: Tree, const PARALLEL: bool, const K: usize> Descent<'a, 
                     }
                     self.visit(bundle, tree.page(node), &interval, live, probe);
                     if B::TAKES_UP_THE_REST && self.work <= B::PATIENCE * K as u32 {
-                        stack.drop_last();
+                        stack.pop();
                     }
                     break;
                 }
