@@ -67,6 +67,32 @@ fn the_json_has_a_row_for_every_kernel_kind_and_thread_count() {
 }
 
 #[test]
+fn where_rays_went_is_told_of_modes_that_choose() {
+    let (_folder, model) = model();
+    let options = ["--engines", "raypack", "--rays", "camera,diffuse", "--threads", "2"];
+    let run = bench(&model).args(options).args(["--json", "-"]).assert();
+    let report: Value = serde_json::from_slice(&run.success().get_output().stdout).unwrap();
+    let choices = report["choices"].as_array().unwrap();
+    let told: Vec<_> = choices.iter().map(|told| [&told["rays"], &told["mode"]]).collect();
+    assert_eq!(told, [["camera", "auto"], ["camera", "mixed"], ["diffuse", "auto"], ["diffuse", "mixed"]]);
+    for told in choices {
+        let is_row = |row: &&Value| row["rays"] == told["rays"] && row["mode"] == told["mode"];
+        let rows: Vec<&Value> = report["rows"].as_array().unwrap().iter().filter(is_row).collect();
+        let timed: u64 =
+            rows.iter().map(|row| row["count"].as_u64().unwrap() * row["rounds"].as_u64().unwrap()).sum();
+        let kernels = told["kernels"].as_array().unwrap();
+        let went: u64 = kernels.iter().map(|share| share["rays"].as_u64().unwrap()).sum();
+        assert!(rows.len() == 2 && went > timed, "{told}: of {timed} and what warms up");
+        assert!(kernels.iter().all(|share| share["kernel"].is_string() && share["rays"] != 0), "{told}");
+    }
+    // A named kernel has no choice.
+    let run = bench(&model).args(options).args(["--modes", "tile,packet16"]).assert();
+    run.success().stdout(predicate::str::contains("raypack chooses").not());
+    let run = bench(&model).args(options).args(["--modes", "tile,auto"]).assert();
+    run.success().stdout(predicate::str::is_match("raypack chooses\n\nrays +mode").unwrap());
+}
+
+#[test]
 fn json_on_standard_output_is_nothing_but_json() {
     let (_folder, model) = model();
     let run = bench(&model)

@@ -2,6 +2,7 @@
 
 use crate::geometry::{Accuracy, Hit, Ray};
 use crate::simd::prefetch;
+use crate::traverse::Kernel;
 use std::sync::{Mutex, PoisonError};
 
 /// Rays that a worker takes at a time, at least.
@@ -50,6 +51,11 @@ pub trait Contender: Sync {
 
     /// Brings a chunk's rays, and the memory for its results, into the caches: before the clock runs.
     fn fetch(&self, _chunk: usize) {}
+
+    /// Kernels, and how many rays each has traced since the beginning, for a mode that chooses among some.
+    fn traced(&self) -> Vec<(Kernel, u64)> {
+        Vec::new()
+    }
 
     /// Traces one chunk and writes its results; the chunks of a set may run at the same time.
     fn trace(&self, chunk: usize);

@@ -35,7 +35,7 @@ pub use agreement::Agreement;
 pub use engine::Results;
 pub use machine::hardware_threads;
 pub use race::Pace;
-pub use report::{Beams, EngineInfo, Header, Report, Row};
+pub use report::{Beams, Choices, EngineInfo, Header, Report, Row, Share};
 
 use crate::error::{Error, Result};
 use crate::geometry::{Accuracy, Hit, Ray};
@@ -182,6 +182,7 @@ pub fn run(model: &str, mesh: &Mesh, options: &Options, progress: &mut dyn FnMut
             light: setup.light.to_array(),
         },
         rows: Vec::new(),
+        choices: Vec::new(),
         beams: Vec::new(),
         agreements: Vec::new(),
         notes,
@@ -279,6 +280,11 @@ fn race_kind(
     for (i, contender) in contenders.iter().enumerate() {
         let mut of_mode = speeds.iter().filter(|s| s.0 == i).peekable();
         let Some(&&(_, _, first)) = of_mode.peek() else { continue };
+        let share = |(kernel, rays): (Kernel, u64)| Share { kernel: kernel.name(), rays };
+        let kernels: Vec<Share> = contender.traced().into_iter().map(share).collect();
+        if !kernels.is_empty() {
+            report.choices.push(Choices { rays: kind, mode: contender.mode(), kernels });
+        }
         (0..chunks).for_each(|chunk| contender.trace(chunk));
         let results = contender.results();
         let engine = entries[i].engine;

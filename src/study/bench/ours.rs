@@ -111,7 +111,7 @@ impl Ours {
                 *out = accel.occluded_packet(packet, lanes);
             }
         };
-        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
+        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any, learnt: None })
     }
 
     /// A mode that traces sixteen packets of 16 together, or sixty-four, as far as they are alike.
@@ -127,7 +127,7 @@ impl Ours {
                 accel.occluded_tile(packets, lanes, out);
             }
         };
-        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any })
+        Box::new(PacketRun { engine: self, mode: kernel.name(), lots, closest, any, learnt: None })
     }
 
     /// The mode that finds out which kernel is quickest. What a worker has learnt is put down after each
@@ -135,7 +135,7 @@ impl Ours {
     /// round: in a picture that is new they would be new, too.
     fn auto<'a>(&'a self, lots: Arc<[PacketLot<16>]>) -> Box<dyn Contender + 'a> {
         let learnt = Arc::new(DispatchPool::<Dispatch>::default());
-        let shared = Arc::clone(&learnt);
+        let (shared, of_any) = (Arc::clone(&learnt), Arc::clone(&learnt));
         let closest = move |accel: &Accel, rays: &Packets<16>, hits: &mut [HitPacket<16>]| {
             let mut dispatch = shared.take();
             for ((packets, lanes), out) in rays.tiles(FIELD).zip(hits.chunks_mut(FIELD)) {
@@ -144,13 +144,13 @@ impl Ours {
             shared.put(dispatch);
         };
         let any = move |accel: &Accel, rays: &Packets<16>, flags: &mut [u32]| {
-            let mut dispatch = learnt.take();
+            let mut dispatch = of_any.take();
             for ((packets, lanes), out) in rays.tiles(FIELD).zip(flags.chunks_mut(FIELD)) {
                 dispatch.occluded(accel, &[], packets, lanes, out);
             }
-            learnt.put(dispatch);
+            of_any.put(dispatch);
         };
-        Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any })
+        Box::new(PacketRun { engine: self, mode: AUTO, lots, closest, any, learnt: Some(learnt) })
     }
 }
 
@@ -208,6 +208,13 @@ fn slices(rays: &[Ray], any_hit: bool) -> Vec<Lot<Vec<Ray>, Hit, bool>> {
     Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec)
 }
 
+/// Rays by kernel, of all that `each` hands over.
+fn sum(each: impl FnOnce(&mut dyn FnMut((Kernel, u64)))) -> Vec<(Kernel, u64)> {
+    let mut sums = Kernel::ALL.map(|kernel| (kernel, 0));
+    each(&mut |(kernel, rays)| sums[kernel as usize].1 += rays);
+    sums.into_iter().filter(|&(_, rays)| rays > 0).collect()
+}
+
 /// A mode that is given rays one by one.
 struct SliceRun<'a> {
     engine: &'a Ours,
@@ -236,6 +243,13 @@ impl Contender for SliceRun<'_> {
 
     fn bytes(&self) -> u64 {
         self.engine.bytes()
+    }
+
+    fn traced(&self) -> Vec<(Kernel, u64)> {
+        match &self.way {
+            Way::Named(_) => Vec::new(),
+            Way::Mixed(learnt) => sum(|add| learnt.look(|dispatch| dispatch.traced().for_each(&mut *add))),
+        }
     }
 
     fn fetch(&self, chunk: usize) {
@@ -315,6 +329,8 @@ struct PacketRun<'a, const W: usize, C, A> {
     lots: Arc<[PacketLot<W>]>,
     closest: C,
     any: A,
+    /// What workers have learnt, if it chooses.
+    learnt: Option<Arc<DispatchPool<Dispatch>>>,
 }
 
 impl<const W: usize, C, A> Contender for PacketRun<'_, W, C, A>
@@ -332,6 +348,12 @@ where
 
     fn bytes(&self) -> u64 {
         self.engine.bytes()
+    }
+
+    fn traced(&self) -> Vec<(Kernel, u64)> {
+        self.learnt.as_ref().map_or_else(Vec::new, |learnt| {
+            sum(|add| learnt.look(|dispatch| dispatch.traced().for_each(&mut *add)))
+        })
     }
 
     fn fetch(&self, chunk: usize) {

@@ -13,6 +13,8 @@ pub struct Report {
     pub header: Header,
     /// A row for each engine, mode, kind of ray and number of threads.
     pub rows: Vec<Row>,
+    /// Where the modes went that choose among raypack's kernels.
+    pub choices: Vec<Choices>,
     /// What raypack's beams did with each kind of ray that made any.
     pub beams: Vec<Beams>,
     /// How the engines' answers compare.
@@ -101,6 +103,27 @@ pub struct Row {
     pub build_seconds: f64,
     /// Bytes that the mode's tree holds.
     pub bytes: u64,
+}
+
+/// What a mode chose that chooses among raypack's kernels.
+#[derive(Clone, Debug, Serialize)]
+pub struct Choices {
+    /// The kind of ray.
+    pub rays: RayKind,
+    /// The mode's name.
+    pub mode: String,
+    /// Kernels that it took, and how many rays each has traced in all: by any number of threads, rounds that were not timed among
+    /// them. Rays that went two ways, to compare these, count with either.
+    pub kernels: Vec<Share>,
+}
+
+/// Rays that went to a kernel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Share {
+    /// The kernel's name.
+    pub kernel: &'static str,
+    /// How many rays.
+    pub rays: u64,
 }
 
 /// What raypack's tile kernel did with a set of rays, counted in a run of its own.

@@ -1,7 +1,8 @@
 //! The report as text: one table of best modes, one of all of them.
 
-use super::report::{Beams, Report, Row};
+use super::report::{Beams, Choices, Report, Row};
 use crate::study::text::{figure, grid, grouped};
+use crate::traverse::Kernel;
 use std::fmt;
 
 impl fmt::Display for Report {
@@ -26,6 +27,10 @@ impl fmt::Display for Report {
         write!(f, "{}", grid(&self.summary()))?;
         writeln!(f, "\nEvery mode that ran\n")?;
         write!(f, "{}", grid(&self.modes()))?;
+        if !self.choices.is_empty() {
+            writeln!(f, "\nOf a hundred rays, those that went to each kernel where raypack chooses\n")?;
+            write!(f, "{}", grid(&self.choice_lines()))?;
+        }
         if !self.beams.is_empty() {
             writeln!(
                 f,
@@ -42,6 +47,30 @@ impl fmt::Display for Report {
 }
 
 impl Report {
+    /// A line for each kind of ray and mode that chooses, with a column for each kernel that was chosen by any.
+    fn choice_lines(&self) -> Vec<Vec<String>> {
+        let of = |choices: &Choices, kernel: Kernel| {
+            choices
+                .kernels
+                .iter()
+                .filter(|share| share.kernel == kernel.name())
+                .map(|share| share.rays)
+                .sum::<u64>()
+        };
+        let is_taken = |&kernel: &Kernel| self.choices.iter().any(|choices| of(choices, kernel) > 0);
+        let kernels: Vec<Kernel> = Kernel::ALL.into_iter().filter(is_taken).collect();
+        let mut head = ["rays", "mode"].map(String::from).to_vec();
+        head.extend(kernels.iter().map(|kernel| kernel.name().to_owned()));
+        let line = |choices: &Choices| {
+            let all: u64 = choices.kernels.iter().map(|share| share.rays).sum();
+            let part = |&kernel: &Kernel| figure(100.0 * of(choices, kernel) as f64 / all as f64);
+            let mut line = vec![choices.rays.name().to_owned(), choices.mode.clone()];
+            line.extend(kernels.iter().map(part));
+            line
+        };
+        std::iter::once(head).chain(self.choices.iter().map(line)).collect()
+    }
+
     /// A line for each kind of ray that made beams.
     fn beam_lines(&self) -> Vec<Vec<String>> {
         let head = [

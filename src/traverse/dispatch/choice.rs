@@ -69,6 +69,9 @@ const FIRST_KIND: f32 = 2.6;
 /// grow dearer meanwhile are not taken for a way that is slow.
 const FIRST: u32 = 2;
 
+/// Where a kind of place is new, half of the lots count that taught about the nearest one, but no more than these.
+const ELSEWHERE: u32 = 8;
+
 /// The least that a new figure counts, and one of a trial. What a lot costs beside the one before differs by a factor of two in the
 /// middle, so that it takes a hundred of them to tell a tenth.
 const WEIGHT: f32 = 0.02;
@@ -194,6 +197,11 @@ impl<const WAYS: usize> Choice<WAYS> {
         self.lots < 2 * FIRST * self.ways().count() as u32
     }
 
+    /// Whether so many lots were traced.
+    pub const fn has_seen(&self, lots: u32) -> bool {
+        self.lots >= lots
+    }
+
     /// The way for the next lot, of whose place is known what some ways cost there before: see [`Costs::known`].
     ///
     /// [`Costs::known`]: super::places::Costs::known
@@ -245,7 +253,7 @@ impl<const WAYS: usize> Choice<WAYS> {
         let Some(nearest) = self.nearest_known(new).filter(|&nearest| nearest != new) else { return };
         let Kind { cost, taken, .. } = self.kinds[nearest];
         let kind = &mut self.kinds[new];
-        *kind = Kind { cost, taken: taken.map(|taken| taken.min(FIRST)), wait: [0.0; WAYS] };
+        *kind = Kind { cost, taken: taken.map(|taken| (taken / 2).min(ELSEWHERE)), wait: [0.0; WAYS] };
         kind.wait = std::array::from_fn(|way| kind.wait_of(way) * WAIT_WHERE_NEW);
     }
 

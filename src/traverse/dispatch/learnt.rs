@@ -6,8 +6,8 @@ use super::choice::{Choice, cost_of};
 use super::duel::{Duel, Turn};
 use super::places::Costs;
 use super::{
-    BEAM, FRUGAL, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, WAYS, WIDE, leave_out_halves,
-    recorded,
+    BEAM, FRUGAL, LEAST_RAYS, LIST, LISTS, LISTS_OR_BEAMS, LOT, PACKETS, Place, Traced, WAYS, WIDE,
+    leave_out_halves, recorded,
 };
 use crate::traverse::accel::Accel;
 use crate::traverse::kernel::Kernel;
@@ -17,6 +17,10 @@ use std::time::Duration;
 /// Where packets take no longer than that beside beams, as a logarithm (base 2), lists are tried: they share more than packets do, and
 /// less than beams. (Chosen by replays, see `docs/coherent.md`.)
 const NEAR: f32 = 0.5;
+
+/// As many squares or lots tell what beams and packets are like, before lists are compared with them: while these are being found out, half
+/// of the squares go a way that is slow for them, and once lists are the rule there are few to find it out by.
+pub const MATURE: u32 = 128;
 
 /// What was learnt about one kind of question.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,6 +38,8 @@ pub struct Learnt {
 pub struct Beams {
     pub wide: Duel,
     pub squares: Choice<{ WAYS.len() }>,
+    /// All rays of that kind, those that went as lists among them.
+    pub traced: Traced,
 }
 
 impl Learnt {
@@ -49,13 +55,16 @@ impl Learnt {
             let Self { lists, beams, .. } = self;
             match way {
                 Some(LISTS) => {
+                    beams.traced.add(Kernel::Filter, count);
                     let trace = || next.trace::<Q>(accel, Kernel::Filter);
                     if let Some(cost) = recorded(accel, lists, LISTS, count, trace) {
                         self.passed_as_lists(cost);
                     }
                 }
                 Some(way) if count >= LEAST_RAYS => {
-                    recorded(accel, lists, way, count, || beams.lot::<Q>(accel, next));
+                    let start = Stopwatch::start(accel);
+                    let in_vain = beams.lot::<Q>(accel, next);
+                    lists.record(way, count, start.elapsed(accel).saturating_sub(in_vain));
                 }
                 _ => {
                     beams.lot::<Q>(accel, next);
@@ -73,7 +82,8 @@ impl Learnt {
     ) -> Option<usize> {
         let go_as_lists = self.go_as_lists();
         let Self { lists, beams: Beams { squares, .. }, least_by_lists, .. } = self;
-        if !Q::may_go_as_lists(accel) || !field.is_chosen_for(accel, squares) {
+        let is_known_well = field.is_chosen_for(accel, squares) && squares.has_seen(MATURE);
+        if !Q::may_go_as_lists(accel) || !is_known_well {
             return None;
         }
         // Where beams are far quicker than packets, they are quicker than lists, unless it has turned out otherwise. And rays that run
@@ -102,7 +112,7 @@ impl Learnt {
 
     /// The kernel that is thought to be quickest at the moment.
     pub fn quickest(&self) -> Kernel {
-        let Beams { wide, squares } = &self.beams;
+        let Beams { wide, squares, .. } = &self.beams;
         match WAYS[squares.quickest()] {
             _ if self.go_as_lists() => Kernel::Filter,
             Kernel::Tile if !wide.is_beginning() && wide.quicker() == WIDE => Kernel::WideTile,
@@ -112,22 +122,26 @@ impl Learnt {
 }
 
 impl Beams {
-    /// Has a lot traced, wide or square by square, or, to compare the two, both.
-    fn lot<Q: Question>(&mut self, accel: &Accel, mut lot: Asked<'_, '_, Q::Answer>) {
-        let Self { wide, squares } = self;
+    /// Has a lot traced, wide or square by square, or, to compare the two, both. Gives the time that the slower one of both took then.
+    fn lot<Q: Question>(&mut self, accel: &Accel, mut lot: Asked<'_, '_, Q::Answer>) -> Duration {
+        let Self { wide, squares, traced } = self;
         // Where packets are quicker than beams, wide ones are out of the question.
         let packets_were_quicker =
             |place: &Place<'_>| Q::costs(place).is_some_and(|costs| costs.is_slower(BEAM));
         let in_beams = squares.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
         let count = lot.count();
         if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams || count < LEAST_RAYS {
-            return by_squares::<Q>(squares, accel, lot);
+            by_squares::<Q>(squares, traced, accel, lot);
+            return Duration::ZERO;
         }
         let mut trace = |way, lot: Asked<'_, '_, Q::Answer>| {
             let start = Stopwatch::start(accel);
             match way {
-                WIDE => lot.trace::<Q>(accel, Kernel::WideTile),
-                _ => by_squares::<Q>(squares, accel, lot),
+                WIDE => {
+                    traced.add(Kernel::WideTile, count);
+                    lot.trace::<Q>(accel, Kernel::WideTile);
+                }
+                _ => by_squares::<Q>(squares, traced, accel, lot),
             }
             start.elapsed(accel)
         };
@@ -136,21 +150,24 @@ impl Beams {
                 let spent = trace(WIDE, lot);
                 squares.pass(cost_of(count, spent));
             }
-            Turn::One(_) => by_squares::<Q>(squares, accel, lot),
+            Turn::One(_) => by_squares::<Q>(squares, traced, accel, lot),
             Turn::Both(ways) => {
                 let mut spent = [Duration::ZERO; 2];
                 for way in ways {
                     spent[way] = trace(way, lot.again());
                 }
                 wide.record(spent);
+                return spent[0].max(spent[1]);
             }
         }
+        Duration::ZERO
     }
 }
 
 /// Has packets traced square by square, each by the kernel that is quickest at its place.
 fn by_squares<Q: Question>(
     choice: &mut Choice<{ WAYS.len() }>,
+    traced: &mut Traced,
     accel: &Accel,
     lot: Asked<'_, '_, Q::Answer>,
 ) {
@@ -162,12 +179,17 @@ fn by_squares<Q: Question>(
         Q::trace(kernel, accel, rays, active, answers);
     };
     if let Some(way) = together {
+        traced.add(WAYS[way], count_of_rays);
         let trace_all = || lot.squares().for_each(|square| trace(WAYS[way], square));
         recorded(accel, choice, way, count_of_rays, trace_all);
         return;
     }
     for (square, place) in lot.squares().zip(places.chain(std::iter::repeat(None))) {
-        timed(accel, choice, place, count(square.1), |kernel| trace(kernel, square));
+        let rays = count(square.1);
+        timed(accel, choice, place, rays, |kernel| {
+            traced.add(kernel, rays);
+            trace(kernel, square);
+        });
     }
 }
 

@@ -110,9 +110,32 @@ impl Dispatch {
         [self.closest.quickest(), self.any.quickest()]
     }
 
+    /// Kernels, and how many rays each has traced: for closest hits and for any hit together. Rays that went two ways, to compare
+    /// these, count with either.
+    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
+        let [closest, any] = [self.closest.beams.traced, self.any.beams.traced];
+        Kernel::ALL.into_iter().map(move |kernel| (kernel, closest.of(kernel) + any.of(kernel)))
+    }
+
     /// Whether rays that look for closest hits go as lists at the moment, which are the quicker the more of them go at once.
     pub fn looks_in_lists(&self) -> bool {
         self.closest.go_as_lists()
+    }
+}
+
+/// How many rays each kernel has traced.
+#[derive(Clone, Copy, Debug, Default)]
+struct Traced([u64; Kernel::ALL.len()]);
+
+impl Traced {
+    /// So many more.
+    const fn add(&mut self, kernel: Kernel, rays: usize) {
+        self.0[kernel as usize] += rays as u64;
+    }
+
+    /// Those of one kernel.
+    const fn of(&self, kernel: Kernel) -> u64 {
+        self.0[kernel as usize]
     }
 }
 

@@ -98,6 +98,42 @@ fn the_quickest_kernel_is_named() {
     assert_eq!(named(1, 0, 0)[0], Kernel::WideTile);
 }
 
+/// While beams and packets are being found out, they look slower than they are.
+#[test]
+fn lists_are_not_compared_before_beams_and_packets_are_known() {
+    let (accel, mut dispatch) = (soup(), Dispatch::default());
+    for lot in 0.. {
+        check(&mut dispatch, &accel, &[], lot, 64);
+        let Learnt { beams, have_gone_as_lists, .. } = &dispatch.any;
+        if beams.squares.has_seen(learnt::MATURE) {
+            break;
+        }
+        assert!(!have_gone_as_lists, "lot {lot}");
+    }
+}
+
+/// What is told of where rays went adds up.
+#[test]
+fn every_ray_is_counted_with_a_kernel_that_traced_it() {
+    for pools in [false, true] {
+        let (accel, mut dispatch, mut rays) = (soup(), Dispatch::default(), 0);
+        if pools {
+            accel.make_pools().expect("a soup has pools");
+        }
+        for lot in 0..60 {
+            let count = [64, 256, 16, 37][lot % 4];
+            check(&mut dispatch, &accel, &[], lot, count);
+            rays += (0..count).map(|i| u64::from((0xffff_u32 >> (i % 5)).count_ones())).sum::<u64>();
+        }
+        for learnt in [&dispatch.closest, &dispatch.any] {
+            let traced: u64 = learnt.beams.traced.0.iter().sum();
+            assert!(rays <= traced && traced < 2 * rays, "{traced} of {rays}");
+        }
+        let told: u64 = dispatch.traced().map(|(_, rays)| rays).sum();
+        assert!(2 * rays <= told && told < 4 * rays, "{told} of {rays}");
+    }
+}
+
 /// Lists go through what has been made for them: through the tree, closest hits are looked for without them.
 #[test]
 fn closest_hits_are_looked_for_in_lists_through_pools_alone() {
