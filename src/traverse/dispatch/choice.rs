@@ -65,6 +65,9 @@ const WIDTH: f32 = 0.6;
 /// Logarithm of the nanoseconds a ray where the first one ends.
 const FIRST_KIND: f32 = 2.6;
 
+/// The last kind of place that there is next to nothing in: up to 9 ns a ray.
+const NOTHING: usize = 1;
+
 /// How often all ways are tried at the start, there and back (first, second, second, first), so that lots that
 /// grow dearer meanwhile are not taken for a way that is slow.
 const FIRST: u32 = 2;
@@ -162,17 +165,17 @@ impl<const WAYS: usize> Choice<WAYS> {
         due.unwrap_or(quickest)
     }
 
-    /// Whether a way is thought to be quickest for so many lots to come, with no other one to be tried meanwhile. Then they are
-    /// taken to be one.
-    pub fn settles_on(&mut self, way: usize, lots: usize) -> bool {
+    /// Whether a way is thought to be no more than `behind` the quickest for so many lots to come, as a logarithm (base 2), with no other one
+    /// to be tried meanwhile. Then they are taken to be one.
+    pub fn settles_on(&mut self, way: usize, lots: usize, behind: f32) -> bool {
         if self.is_beginning() {
             return false;
         }
         self.meet(self.here);
-        let quickest = self.quickest();
+        let is_behind = self.behind(way) > behind;
         let kind = &mut self.kinds[self.here];
         let is_due = |other: usize| other != way && kind.wait[other] <= lots as f32;
-        if quickest != way || (0..WAYS).any(is_due) {
+        if is_behind || (0..WAYS).any(is_due) {
             return false;
         }
         kind.wait.iter_mut().for_each(|wait| *wait -= lots as f32);
@@ -182,7 +185,7 @@ impl<const WAYS: usize> Choice<WAYS> {
 
     /// Whether next to nothing is here: where lots cost least.
     pub const fn is_cheapest(&self) -> bool {
-        self.here == 0
+        self.here <= NOTHING
     }
 
     /// The same where the way is known to be quickest at the places of all of them, but for one in how many visits that asks
@@ -260,6 +263,12 @@ impl<const WAYS: usize> Choice<WAYS> {
     /// The way that is thought to be quickest for the next lot.
     pub fn quickest(&self) -> usize {
         self.kind_here().quickest()
+    }
+
+    /// How much longer than by the quickest way it takes by a given one, in the kind of place that the next lot is in, as a logarithm (base 2).
+    pub fn behind(&self, way: usize) -> f32 {
+        let Kind { cost, .. } = self.kind_here();
+        cost[way] - cost[smallest(cost)]
     }
 
     /// How much longer than by the way that is quickest in the kind of place that the next lot is in it takes by the next best, as a

@@ -18,9 +18,14 @@ use std::time::Duration;
 /// less than beams. (Chosen by replays, see `docs/coherent.md`.)
 const NEAR: f32 = 0.5;
 
-/// As many squares or lots tell what beams and packets are like, before lists are compared with them: while these are being found out, half
-/// of the squares go a way that is slow for them, and once lists are the rule there are few to find it out by.
+/// As many squares or lots tell what beams and packets are like, before lists are compared with them: while these are being found out, many
+/// squares go a way that is slow for them, and once lists are the rule there are few to find it out by (`docs/coherent.md`).
 pub const MATURE: u32 = 128;
+
+/// What cannot be told from nothing where there is next to nothing, as a logarithm (base 2): of some hundred lots of sky a few end at
+/// something that costs several times as much, and which way they happened to go says nothing of it. There beams are taken, which are what
+/// comes next.
+const ALIKE: f32 = 0.15;
 
 /// What was learnt about one kind of question.
 #[derive(Clone, Copy, Debug, Default)]
@@ -128,7 +133,7 @@ impl Beams {
         // Where packets are quicker than beams, wide ones are out of the question.
         let packets_were_quicker =
             |place: &Place<'_>| Q::costs(place).is_some_and(|costs| costs.is_slower(BEAM));
-        let in_beams = squares.quickest() == BEAM && !lot.places.iter().any(packets_were_quicker);
+        let in_beams = go_in_beams(squares) && !lot.places.iter().any(packets_were_quicker);
         let count = lot.count();
         if !Q::HAS_WIDE_BEAMS || !lot.is_chosen_for(accel, squares) || !in_beams || count < LEAST_RAYS {
             by_squares::<Q>(squares, traced, accel, lot);
@@ -218,6 +223,11 @@ fn timed(
     }
 }
 
+/// Whether beams are thought to be quickest, or no slower where there is next to nothing than can be told there.
+pub fn go_in_beams(squares: &Choice<{ WAYS.len() }>) -> bool {
+    squares.quickest() == BEAM || squares.is_cheapest() && squares.behind(BEAM) <= ALIKE
+}
+
 /// The way that all of a lot's squares go, with nothing to be learnt of any by itself: as beams, or, where there is next to nothing,
 /// whichever way.
 fn way_of_all<'a>(
@@ -226,8 +236,9 @@ fn way_of_all<'a>(
     squares: usize,
 ) -> Option<usize> {
     if places.clone().flatten().next().is_none() {
-        let way = if choice.is_cheapest() { choice.quickest() } else { BEAM };
-        return choice.settles_on(way, squares).then_some(way);
+        let way = if choice.is_cheapest() && !go_in_beams(choice) { choice.quickest() } else { BEAM };
+        let behind = if choice.is_cheapest() { ALIKE } else { 0.0 };
+        return choice.settles_on(way, squares, behind).then_some(way);
     }
     let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
     (places.flatten().all(go_best) && choice.settles_there()).then_some(BEAM)

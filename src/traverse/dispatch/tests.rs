@@ -98,6 +98,25 @@ fn the_quickest_kernel_is_named() {
     assert_eq!(named(1, 0, 0)[0], Kernel::WideTile);
 }
 
+/// Whether squares go in beams that cost so much by each way, in nanoseconds a ray.
+fn beams_are_taken(cost: [f64; 3]) -> bool {
+    let mut squares = Choice::default();
+    for _ in 0..400 {
+        let way = squares.next();
+        squares.record(way, 256, Duration::from_nanos((256.0 * cost[way]) as u64));
+    }
+    learnt::go_in_beams(&squares)
+}
+
+#[test]
+fn beams_are_taken_where_there_is_next_to_nothing_unless_others_are_clearly_quicker() {
+    // As quick, a little slower, and much slower, in the sky.
+    assert!(beams_are_taken([7.0, 7.0, 9.0]) && beams_are_taken([7.0, 6.7, 9.0]));
+    assert!(!beams_are_taken([7.0, 5.0, 9.0]) && !beams_are_taken([7.0, 9.0, 5.0]));
+    // Elsewhere.
+    assert!(beams_are_taken([60.0, 70.0, 80.0]) && !beams_are_taken([70.0, 60.0, 80.0]));
+}
+
 /// While beams and packets are being found out, they look slower than they are.
 #[test]
 fn lists_are_not_compared_before_beams_and_packets_are_known() {

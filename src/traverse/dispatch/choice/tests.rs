@@ -152,12 +152,13 @@ fn what_was_traced_some_other_way_says_where_the_next_lot_is() {
 #[test]
 fn lots_that_are_taken_to_be_one_leave_room_for_trials() {
     let mut choice = Choice::<2>::default();
-    assert!(!choice.settles_on(0, 4), "nothing is known yet");
+    assert!(!choice.settles_on(0, 4, 0.0), "nothing is known yet");
     run(&mut choice, 100, |_| [30.0, 60.0]);
     let (mut lots, mut tried) = (0, 0);
     while lots < 4000 {
-        assert!(!choice.settles_on(1, 4), "the other one is quicker");
-        if choice.settles_on(0, 4) {
+        assert!(!choice.settles_on(1, 4, 0.0), "the other one is quicker");
+        assert!(!choice.settles_on(1, 4, 0.5), "by a doubling");
+        if choice.settles_on(0, 4, 0.0) {
             choice.record(0, 1024, Duration::from_nanos(30 * 1024));
             lots += 4;
         } else {
@@ -169,6 +170,18 @@ fn lots_that_are_taken_to_be_one_leave_room_for_trials() {
     }
     // Three times slower, squared: one in 260 or so.
     assert!((8..40).contains(&tried), "{tried}");
+}
+
+#[test]
+fn a_way_that_is_hardly_slower_may_be_settled_on() {
+    let mut choice = Choice::<2>::default();
+    run(&mut choice, 400, |_| [30.0, 31.0]);
+    assert!((0.0..0.15).contains(&choice.behind(1)) && choice.behind(0) == 0.0);
+    let settles = |behind| {
+        let mut choice = choice;
+        choice.settles_on(1, 1, behind)
+    };
+    assert_eq!([0.0, 0.2].map(settles), [choice.quickest() == 1, true]);
 }
 
 #[test]
