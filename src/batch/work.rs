@@ -2,7 +2,7 @@
 
 use crate::geometry::{Hit, Ray};
 use crate::render::{Sharing, Workers};
-use crate::traverse::{Accel, Kernel, SliceDispatch};
+use crate::traverse::{Accel, Kernel, SliceDispatch, tally};
 use std::thread;
 use std::time::Instant;
 
@@ -97,12 +97,7 @@ impl Plan<'_> {
             work(tracer, job);
         });
 
-        let all = outcome.states.iter().flat_map(Tracer::traced);
-        let mut kernels = Kernel::ALL.map(|kernel| (kernel, 0));
-        for (kernel, rays) in all {
-            kernels.iter_mut().filter(|(of, _)| *of == kernel).for_each(|(_, sum)| *sum += rays);
-        }
-        let mut kernels: Vec<_> = kernels.into_iter().filter(|&(_, rays)| rays > 0).collect();
+        let mut kernels = tally(outcome.states.iter().flat_map(Tracer::traced));
         kernels.sort_by_key(|&(_, rays)| std::cmp::Reverse(rays));
         Traced { kernels, threads, seconds: start.elapsed().as_secs_f64() }
     }

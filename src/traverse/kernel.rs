@@ -85,6 +85,15 @@ impl Kernel {
     }
 }
 
+/// Rays by kernel: the sums of what kernels have traced, of which one may be there more than once, without those that traced none.
+pub fn tally(traced: impl IntoIterator<Item = (Kernel, u64)>) -> Vec<(Kernel, u64)> {
+    let mut sums = Kernel::ALL.map(|kernel| (kernel, 0));
+    for (kernel, rays) in traced {
+        sums[kernel as usize].1 += rays;
+    }
+    sums.into_iter().filter(|&(_, rays)| rays > 0).collect()
+}
+
 impl fmt::Display for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())

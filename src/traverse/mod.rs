@@ -40,6 +40,7 @@ pub(crate) use ahead::look_ahead;
 pub use coarse::{Entry, first_page};
 pub use dispatch::{Dispatch, DispatchPool, Place, Places, ScatteredDispatch, SliceDispatch};
 pub use kernel::Kernel;
+pub(crate) use kernel::tally;
 pub(crate) use lanes::give_lanes;
 pub use lanes::{HitPacket, RayPacket};
 pub use sieve::Sieve;

@@ -14,6 +14,7 @@ use crate::simd::Isa;
 use crate::study::rays::RayKind;
 use crate::traverse::{
     Accel, Dispatch, DispatchPool, HitPacket, Kernel, PacketWidth, RayPacket, SliceDispatch, TileCounts,
+    tally,
 };
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -208,13 +209,6 @@ fn slices(rays: &[Ray], any_hit: bool) -> Vec<Lot<Vec<Ray>, Hit, bool>> {
     Lot::cut(rays, any_hit, Hit::MISS, |n| n, <[Ray]>::to_vec)
 }
 
-/// Rays by kernel, of all that `each` hands over.
-fn sum(each: impl FnOnce(&mut dyn FnMut((Kernel, u64)))) -> Vec<(Kernel, u64)> {
-    let mut sums = Kernel::ALL.map(|kernel| (kernel, 0));
-    each(&mut |(kernel, rays)| sums[kernel as usize].1 += rays);
-    sums.into_iter().filter(|&(_, rays)| rays > 0).collect()
-}
-
 /// A mode that is given rays one by one.
 struct SliceRun<'a> {
     engine: &'a Ours,
@@ -248,7 +242,7 @@ impl Contender for SliceRun<'_> {
     fn traced(&self) -> Vec<(Kernel, u64)> {
         match &self.way {
             Way::Named(_) => Vec::new(),
-            Way::Mixed(learnt) => sum(|add| learnt.look(|dispatch| dispatch.traced().for_each(&mut *add))),
+            Way::Mixed(learnt) => tally(learnt.look(SliceDispatch::traced)),
         }
     }
 
@@ -351,9 +345,7 @@ where
     }
 
     fn traced(&self) -> Vec<(Kernel, u64)> {
-        self.learnt.as_ref().map_or_else(Vec::new, |learnt| {
-            sum(|add| learnt.look(|dispatch| dispatch.traced().for_each(&mut *add)))
-        })
+        self.learnt.as_ref().map_or_else(Vec::new, |learnt| tally(learnt.look(Dispatch::traced)))
     }
 
     fn fetch(&self, chunk: usize) {

@@ -118,7 +118,7 @@ impl Learnt {
     /// The kernel that is thought to be quickest at the moment.
     pub fn quickest(&self) -> Kernel {
         let Beams { wide, squares, .. } = &self.beams;
-        match WAYS[squares.quickest()] {
+        match WAYS[if go_in_beams(squares) { BEAM } else { squares.quickest() }] {
             _ if self.go_as_lists() => Kernel::Filter,
             Kernel::Tile if !wide.is_beginning() && wide.quicker() == WIDE => Kernel::WideTile,
             kernel => kernel,
@@ -223,9 +223,14 @@ fn timed(
     }
 }
 
-/// Whether beams are thought to be quickest, or no slower where there is next to nothing than can be told there.
+/// How much slower beams may look than the quickest way and be taken all the same.
+fn leeway(squares: &Choice<{ WAYS.len() }>) -> f32 {
+    if squares.is_cheapest() { ALIKE } else { 0.0 }
+}
+
+/// Whether squares go in beams.
 pub fn go_in_beams(squares: &Choice<{ WAYS.len() }>) -> bool {
-    squares.quickest() == BEAM || squares.is_cheapest() && squares.behind(BEAM) <= ALIKE
+    squares.behind(BEAM) <= leeway(squares)
 }
 
 /// The way that all of a lot's squares go, with nothing to be learnt of any by itself: as beams, or, where there is next to nothing,
@@ -237,8 +242,7 @@ fn way_of_all<'a>(
 ) -> Option<usize> {
     if places.clone().flatten().next().is_none() {
         let way = if choice.is_cheapest() && !go_in_beams(choice) { choice.quickest() } else { BEAM };
-        let behind = if choice.is_cheapest() { ALIKE } else { 0.0 };
-        return choice.settles_on(way, squares, behind).then_some(way);
+        return choice.settles_on(way, squares, leeway(choice)).then_some(way);
     }
     let go_best = |costs: &Costs<{ WAYS.len() }>| costs.known()[BEAM].is_some() && !costs.is_slower(BEAM);
     (places.flatten().all(go_best) && choice.settles_there()).then_some(BEAM)

@@ -110,11 +110,11 @@ impl Dispatch {
         [self.closest.quickest(), self.any.quickest()]
     }
 
-    /// Kernels, and how many rays each has traced: for closest hits and for any hit together. Rays that went two ways, to compare
-    /// these, count with either.
-    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
-        let [closest, any] = [self.closest.beams.traced, self.any.beams.traced];
-        Kernel::ALL.into_iter().map(move |kernel| (kernel, closest.of(kernel) + any.of(kernel)))
+    /// Kernels, and how many rays each has traced. One may be there more than once; rays that went two ways, to compare these, count with
+    /// either.
+    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> + use<> {
+        let [Traced(closest), Traced(any)] = [self.closest.beams.traced, self.any.beams.traced];
+        Kernel::ALL.into_iter().zip(closest).chain(Kernel::ALL.into_iter().zip(any))
     }
 
     /// Whether rays that look for closest hits go as lists at the moment, which are the quicker the more of them go at once.
@@ -131,11 +131,6 @@ impl Traced {
     /// So many more.
     const fn add(&mut self, kernel: Kernel, rays: usize) {
         self.0[kernel as usize] += rays as u64;
-    }
-
-    /// Those of one kernel.
-    const fn of(&self, kernel: Kernel) -> u64 {
-        self.0[kernel as usize]
     }
 }
 

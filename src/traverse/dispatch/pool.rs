@@ -18,9 +18,9 @@ impl<D: Default> DispatchPool<D> {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
     }
 
-    /// Shows each that nobody is using.
-    pub fn look(&self, look: impl FnMut(&D)) {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).iter().for_each(look);
+    /// What those tell that nobody is using.
+    pub fn look<T, I: IntoIterator<Item = T>>(&self, tell: impl FnMut(&D) -> I) -> Vec<T> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).iter().flat_map(tell).collect()
     }
 
     /// Keeps what a worker has learnt.
@@ -47,7 +47,7 @@ mod tests {
         squares.record(way, 256, Duration::from_micros(20));
         assert_ne!(said(learned), ignorant);
         pool.put(learned);
-        pool.look(|dispatch| assert_eq!(said(*dispatch), said(learned)));
+        assert_eq!(pool.look(|&dispatch| [said(dispatch)]), [said(learned)]);
         assert_eq!(said(pool.take()), said(learned));
         assert_eq!(said(pool.take()), ignorant, "the other worker has what was learnt");
     }

@@ -185,7 +185,7 @@ impl SliceDispatch {
     }
 
     /// Kernels, and how many rays each has traced. One may be there more than once.
-    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> {
+    pub fn traced(&self) -> impl Iterator<Item = (Kernel, u64)> + use<> {
         let Self { closest, any, scattered } = *self;
         closest.traced().chain(any.traced()).chain(scattered.closest.traced()).chain(scattered.any.traced())
     }
